@@ -1,8 +1,11 @@
-"""Command line: `bumblebee deploy run`, `robot`, `rollouts`."""
+"""Command line: `bumblebee deploy sheet`, `run`, `robot`, `rollouts`."""
 
 import getpass
 import sys
 import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +15,7 @@ from bumblebee.errors import BadInput, plain
 
 if TYPE_CHECKING:
     from bumblebee.motion.clip import Clip
+    from bumblebee.wire.console import Ended
 
 STOPPED = 4
 """Exit status of a run that a safety rule ended."""
@@ -23,19 +27,80 @@ Slow = Annotated[
 ]
 
 
+Policy = Annotated[
+    str,
+    typer.Argument(metavar="POLICY", help="A policy's folder, NAME@ALIAS (registered), or shipped, randomised, imu."),
+]
+Workspace = Annotated[
+    Path, typer.Option("--workspace", help="Of a registered policy: folder with .servers; by default this one.")
+]
+Motions = Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")]
+Bounds = Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")]
+
+
+@app.command("sheet")
+def sheet(
+    policy: Policy,
+    clips: Annotated[list[str] | None, typer.Option("--clip", help="A motion to try; repeat it. All without.")] = None,
+    motions: Motions = "embedded",
+    robots: Annotated[int, typer.Option("--robots", min=1, max=1000, help="Robots that differ, for each motion.")] = 16,
+    minutes: Annotated[float, typer.Option("--minutes", min=0, help="No motion begins after so long.")] = 10.0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the robots, starts and sensor noise.")] = 0,
+    limits: Bounds = None,
+    workspace: Workspace = Path(),
+    out: Annotated[Path, typer.Option("--out", help="New folder for sheet.html and sheet.json.")] = Path("sheet"),
+) -> None:
+    """Try motions on robots that differ, in simulation, and order them by risk: what to watch, when to stop."""
+    from bumblebee.deploy.policy import ExportedPolicy
+    from bumblebee.io.write import refuse_existing, try_output, write_folder
+    from bumblebee.progress import progress
+    from bumblebee.sim.quiet import quiet_mujoco
+    from bumblebee.view.sheet_page import sheet_page
+    from bumblebee.wire.limits import Limits, read_limits
+    from bumblebee.wire.sheet import make_sheet
+    from bumblebee.wire.sheet_file import NAME, as_json, watch
+
+    quiet_mujoco()
+    refuse_existing(out)
+    try_output(out)
+    bounds = read_limits(limits) if limits else Limits()
+    chosen = _clips(motions, clips or [])
+    with _exported(policy, workspace) as folder, progress(len(chosen), "run sheet", "motions") as shown:
+        loaded = ExportedPolicy.load(folder)
+        made = make_sheet(loaded, chosen, robots, bounds, seed, 60 * minutes, lambda said: shown.update(1, said))
+    for one in made.tried:
+        print(
+            plain(
+                f"{one.motion:<20} {100 * one.share:3.0f} % not to the end, tilt {one.tilt_deg:3.0f} deg; {watch(one)}"
+            )
+        )
+    if made.untried:
+        print(plain(f"not tried, the time was over: {', '.join(made.untried)}"))
+    write_folder(out, {"sheet.html": sheet_page(made), NAME: as_json(made)})
+    print(f"written: {out / 'sheet.html'}; for a run: --sheet {out}")
+
+
 @app.command("run")
 def run(
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or shipped, randomised, imu.")],
+    policy: Policy,
     clip: Annotated[str, typer.Option("--clip", help="Name of the motion to follow.")],
     robot: Annotated[str, typer.Option("--robot", help=_WIRES)] = "sim",
     at: At = "",
-    motions: Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")] = "embedded",
+    motions: Motions = "embedded",
     out: Annotated[Path, typer.Option("--out", help="Dataset folder; a run adds a journal and a rollout.")] = Path(
         "deployed"
     ),
-    limits: Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")] = None,
+    limits: Bounds = None,
+    workspace: Workspace = Path(),
+    sheet: Annotated[
+        Path | None, typer.Option("--sheet", help="Run sheet; one of another policy, motion or limits is refused.")
+    ] = None,
     compensation: Annotated[
         Path | None, typer.Option("--compensation", help="File of `bumblebee compensate`, undone on the way.")
+    ] = None,
+    page: Annotated[
+        int | None,
+        typer.Option("--page", min=0, max=65535, help="Show the run on this port of loopback; 0: a free one."),
     ] = None,
     unattended: Annotated[
         bool, typer.Option("--unattended", help="No keys: goes on by itself; simulated robots only.")
@@ -44,27 +109,53 @@ def run(
     operator: Annotated[str, typer.Option("--operator", help="Who runs it, for the log; your login by default.")] = "",
 ) -> None:
     """Check robot and policy, stand up slowly, run one clip, damp; the log is a dataset of measured rollouts."""
-    from bumblebee.learning import pretrained
-    from bumblebee.learning.export import export_shipped
+    from bumblebee.deploy.policy import ExportedPolicy
+    from bumblebee.io.write import write_file
+    from bumblebee.view.after_page import after_page
+    from bumblebee.view.operator_process import operator_page
     from bumblebee.wire.limits import Limits, read_limits
     from bumblebee.wire.session import Run
     from bumblebee.wire.session import run as go
+    from bumblebee.wire.sheet_file import before_run, read_sheet
 
     bounds = read_limits(limits) if limits else Limits()
     if not unattended:
         _require_keys()
-    chosen = _clip(motions, clip)
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = export_shipped(Path(scratch) / policy, policy) if policy in pretrained.SHIPPED else _folder(policy)
+    tried = read_sheet(sheet) if sheet else None
+    (chosen,) = _clips(motions, [clip])
+    with _exported(policy, workspace) as folder:
+        line = before_run(tried, ExportedPolicy.load(folder).sha256, chosen, bounds) if tried else ""
         job = Run(folder, chosen, robot, out, at, compensation, bounds, unattended=unattended, slow=slow,
                   operator=operator or getpass.getuser())  # fmt: skip
-        ended, rollout = go(job, lambda line: print(plain(line), flush=True))
-    print("\n".join(ended.numbers.lines()[1:]))
-    print(f"guard: {', '.join(ended.told['permitted'])}; refused states: {ended.told['refused'] or 'none'}")
-    print(f"written: {rollout}" if rollout else "nothing measured: the policy did not carry the robot")
+        with nullcontext() if page is None else operator_page(page, workspace, _say) as watcher:
+            if line:
+                _say(line)
+            if watcher:
+                watcher.show({"run": {"sheet": line}})
+            ended, rollout = go(job, _say, watcher)
+            _tell(ended, rollout)
+            if rollout:
+                after = out / "pages" / f"{rollout.stem}.html"
+                counts, missed = dict(ended.numbers.rules.most_common()), ended.numbers.missed
+                write_file(after, after_page(ended.reason, counts, missed, rollout, out, workspace))
+                _say(f"written: {after}")
+                if watcher and not unattended:
+                    watcher.show({"after": str(after.resolve())})
+                    with suppress(EOFError, KeyboardInterrupt):
+                        input("The page shows what came; Enter ends it.")
     if ended.reason:
         print(f"stopped by the rule {ended.reason}")
         raise typer.Exit(STOPPED)
+
+
+def _say(line: str) -> None:
+    print(plain(line), flush=True)
+
+
+def _tell(ended: "Ended", rollout: Path | None) -> None:
+    print("\n".join(ended.numbers.lines(ended.numbers.table())[1:]))
+    print(f"guard: {', '.join(ended.told['permitted'])}; refused states: {ended.told['refused'] or 'none'}")
+    print(f"written: {rollout}" if rollout else "nothing measured: the policy did not carry the robot", flush=True)
 
 
 @app.command("robot")
@@ -120,26 +211,36 @@ def _require_keys() -> None:
         raise BadInput("bumblebee deploy run", "a terminal, for the dead-man's key", "none", do)
 
 
-def _folder(policy: str) -> Path:
-    if "@" in policy and not Path(policy).exists():
-        do = f"Run: bumblebee fetch {policy} --out policy; then deploy the folder policy."
-        raise BadInput(policy, "a policy's folder", "a registered name", do)
-    return Path(policy)
+@contextmanager
+def _exported(policy: str, workspace: Path) -> Iterator[Path]:
+    """Folder of a policy that comes along, of a registered one, or of the user's."""
+    from bumblebee.learning import pretrained
+    from bumblebee.learning.export import export_shipped
+    from bumblebee.wire.registered import fetched
+
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / policy.replace("/", "-")
+        if policy in pretrained.SHIPPED:
+            yield export_shipped(folder, policy)
+        elif "@" in policy and not Path(policy).exists():
+            print(plain(fetched(policy, workspace, folder)), flush=True)
+            yield folder
+        else:
+            yield Path(policy)
 
 
-def _clip(motions: str, name: str) -> "Clip":
+def _clips(motions: str, names: Sequence[str]) -> "list[Clip]":
+    """Motions by their names; all without."""
     from bumblebee.motion.embedded import EmbeddedConfig, make
     from bumblebee.motion.embedded.kinds import kinds
-
-    if motions == "embedded":
-        made = {kind.name: kind for kind in kinds()}
-        if name in made:
-            return make(made[name], 0, EmbeddedConfig())
-        raise BadInput("--clip", f"one of {', '.join(made)}", repr(name)[:60])
     from bumblebee.motion.folder import read_folder
     from bumblebee.motion.settings import ReadConfig
 
-    clips = {clip.name: clip for clip in read_folder(Path(motions), ReadConfig()).clips}
-    if name not in clips:
-        raise BadInput("--clip", f"one of {', '.join(sorted(clips)[:20])}", repr(name)[:60])
-    return clips[name]
+    if motions == "embedded":
+        made = {kind.name: partial(make, kind, 0, EmbeddedConfig()) for kind in kinds()}
+    else:
+        made = {clip.name: partial(lambda clip: clip, clip) for clip in read_folder(Path(motions), ReadConfig()).clips}
+    for name in names:
+        if name not in made:
+            raise BadInput("--clip", f"one of {', '.join(made)}"[:1000], repr(name)[:60])
+    return [made[name]() for name in names or made]

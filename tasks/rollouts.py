@@ -27,7 +27,10 @@ from tasks import paths
 from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import parent_of
 from tasks.stage import load, log_run, output_folder, run_stage
-from tasks.stand_in import cut, start_stand_in
+from tasks.stand_in import DIRECT, cut, start_stand_in
+
+OVER_WIRE = ["-m", "bumblebee.wire.stand_in"]
+"""Process of the robot behind guard and wire."""
 
 
 def main(round: int, cluster: str) -> None:
@@ -117,7 +120,8 @@ def run_stand_in(
     plan = {"policies": {name: str(policy.resolve())}, "episodes": episodes, "base": config.base, "stop": stop}
     with tempfile.TemporaryDirectory() as scratch:
         write_library(Path(scratch) / "clips", clips)
-        start_stand_in(plan, Path(scratch) / "clips", folder / "rollouts", Path(scratch), config.threads)
+        out, work, module = folder / "rollouts", Path(scratch), DIRECT if config.wire == "none" else OVER_WIRE
+        start_stand_in(plan, work / "clips", out, work, config.threads, module=module)
 
 
 def copy_users(source: Path, folder: Path) -> None:

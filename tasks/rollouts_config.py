@@ -24,6 +24,10 @@ class RolloutsConfig(Ranged):
     base: Literal["mocap", "odometry", "none"] = "mocap"
     """Source of the base's place for the stand-in: motion capture of 1 mm; odometry that drifts, as on a robot in the
     field; none: the policy gets the odometry and the log no base_pos."""
+    wire: Literal["none", "lcm"] = "none"
+    """lcm: the stand-in runs behind the guard of `bumblebee deploy run`, with LCM's bytes and in the time of its
+    messages, and the rollouts are made of the guard's journal. It knows IMU and odometry then, whatever `base` says,
+    and the log has no base_pos; one core works."""
     max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 10.0
     """Longer clips are cut to their beginning [s]."""
     stop_tilt: Annotated[float, Range(above=0, most=180)] = 25.0

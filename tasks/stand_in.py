@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,16 +14,25 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from tasks import paths
 
+DIRECT = ["-m", "bumblebee.deploy.stand_in"]
+"""Process of the robot that is stepped with the policy."""
+
 
 def start_stand_in(
-    plan: dict[str, Any], clips: Path, out: Path, work: Path, threads: int, sealed: Path = paths.SEALED_ROBOT
+    plan: dict[str, Any],
+    clips: Path,
+    out: Path,
+    work: Path,
+    threads: int,
+    sealed: Path = paths.SEALED_ROBOT,
+    module: Sequence[str] = DIRECT,
 ) -> None:
     """Run a plan on the stand-in robot, in another process, which alone reads the sealed effects."""
     if not sealed.exists():
         raise BadInput(sealed, "the sealed robot", "no such file", "Run the stage seal.")
     file = work / "plan.json"
     file.write_text(json.dumps(plan))
-    command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(sealed), "--clips", str(clips)]
+    command = [sys.executable, *module, "--sealed", str(sealed), "--clips", str(clips)]
     command += ["--plan", str(file), "--out", str(out), "--threads", str(threads), "--with-parent"]
     # The same code as ours, also where it is not installed and the workspace is elsewhere.
     code = os.pathsep.join(filter(None, (str(Path(bumblebee.__file__).parents[1]), os.environ.get("PYTHONPATH"))))

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
         robot.terminate()
         robot.wait()
     print(f"{len(os.sched_getaffinity(0))} cores; load {os.getloadavg()[0]:.1f}; ended by {ended.reason or 'itself'}")
-    print("\n".join(ended.numbers.lines()[1:]))
+    print("\n".join(ended.numbers.lines(ended.numbers.table())[1:]))
     newest = max((options.out / "journals").iterdir(), key=lambda path: path.stat().st_mtime)
     rows = read_journal(newest)[1]
     running = rows[rows["phase"] == Phase.RUN]

@@ -4,11 +4,12 @@ import argparse
 
 import numpy as np
 
-from benchmarks.wire.common import clips, rehearsed, shipped
+from benchmarks.wire.common import clips, shipped
 from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.sensors import SensorNoise
 from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.evaluation.intervals import wilson
+from bumblebee.wire.stand_in import rehearsed
 
 
 def run(options: argparse.Namespace) -> None:

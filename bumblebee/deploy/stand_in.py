@@ -18,6 +18,7 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,11 +31,11 @@ from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import SideBySide
 from bumblebee.deploy.sensors import SensorNoise
-from bumblebee.deploy.stand_in_effects import read_sealed
+from bumblebee.deploy.stand_in_effects import Json, read_sealed
 from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.contract import StartNoise
-from bumblebee.measured.rollout import write_rollout
+from bumblebee.measured.rollout import Rollout, write_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
@@ -59,19 +60,44 @@ class Work:
     judged: bool = False
 
 
-def main(argv: list[str] | None = None) -> int:
+@dataclass(frozen=True)
+class Play:
+    """What a robot gets to do."""
+
+    work: Work
+    policies: dict[str, ExportedPolicy]
+    """By the keys of the work."""
+    clips: dict[str, Clip]
+    """By name."""
+    effects: list[Json]
+    """Entries of the sealed file."""
+    threads: int
+    tick: Callable[[int], None]
+    """Told how many robot ticks were done since the last time."""
+
+
+def side_by_side(play: Play) -> list[Rollout]:
+    """All episodes at once, the policy's command held for each control period."""
+    work, effects = play.work, play.effects
+    make = lambda count: SideBySide(lambda part: StandInRobots(part, effects), count, play.threads)  # noqa: E731
+    noise = SensorNoise(base="mocap" if work.base == "mocap" else "odometry")
+    given = (work.episodes, play.policies, play.clips, noise, work.start, play.tick, work.undone, work.stop)
+    return run_episodes(make, *given, work.judged)
+
+
+def main(argv: list[str] | None = None, robot: Callable[[Play], list[Rollout]] = side_by_side) -> int:
     """Run the process; returns its exit status."""
     options = _options(argv)
     mujoco.set_mju_user_warning(lambda text: None)  # a robot that falls apart is a fall, not a log file
     try:
-        run(options)
+        run(options, robot)
     except BadInput as error:
         print(error, file=sys.stderr, flush=True)
         return EXIT_BAD_INPUT
     return 0
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace, robot: Callable[[Play], list[Rollout]]) -> None:
     """Run all episodes and write one file each."""
     effects = read_sealed(options.sealed) if options.sealed else []
     work = _plan(options) if options.plan else _named(options)
@@ -93,20 +119,17 @@ def run(options: argparse.Namespace) -> None:
                 raise SystemExit(1)
             bar.update(count)
 
-        make = lambda count: SideBySide(lambda part: StandInRobots(part, effects), count, options.threads)  # noqa: E731
-        noise = SensorNoise(base="mocap" if work.base == "mocap" else "odometry")
-        rollouts = run_episodes(
-            make, episodes, policies, clips, noise, work.start, tick, work.undone, work.stop, work.judged
-        )
+        rollouts = robot(Play(work, policies, clips, effects, options.threads, tick))
     for rollout in rollouts if work.base != "none" else [replace(rollout, base_pos=None) for rollout in rollouts]:
         rollout.meta.update({key: value for key, value in recorded.items() if key not in rollout.meta})
-        rollout.meta["notes"] = _ending(rollout.frames, clips[rollout.meta["motion"]])
+        ending = _ending(rollout.frames, clips[rollout.meta["motion"]])
+        rollout.meta["notes"] = "; ".join(filter(None, (ending, str(rollout.meta.get("notes", "")))))
         write_rollout(options.out / f"{rollout.rollout_id}.parquet", rollout)
 
 
 def _ending(frames: int, clip: Clip) -> str:
     return (
-        "ran to the end" if frames == clip.frames else f"fell after {frames / clip.fps:.2f} s of {clip.duration:.2f} s"
+        "ran to the end" if frames >= clip.frames else f"fell after {frames / clip.fps:.2f} s of {clip.duration:.2f} s"
     )
 
 

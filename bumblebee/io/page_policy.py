@@ -4,11 +4,17 @@ import base64
 import hashlib
 
 
-def policy(script: str = "") -> str:
-    """The policy: nothing from anywhere, and of scripts this one alone (none if empty)."""
+def policy(script: str = "", live: bool = False) -> str:
+    """The policy: nothing from anywhere, and of scripts this one alone (none if empty).
+
+    Args:
+        script: the page's own.
+        live: whether the page asks its own server, and sends its buttons there.
+    """
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     scripts = f"; script-src 'sha256-{digest}'" if script else ""
-    return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'{scripts}"
+    own = "form-action 'self'; connect-src 'self'" if live else "form-action 'none'"
+    return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; {own}{scripts}"
 
 
 def policy_tag(script: str = "") -> str:

@@ -56,8 +56,8 @@ class Bar:
 class Block:
     """One piece of a section; which fields count depends on `kind`.
 
-    Kinds: text, note, heading, list, table, film, replay, map, bars, strips, curves, warning, pairs (a table whose rows
-    stack on a phone); and, side by side where there is room: image, still.
+    Kinds: text, note, heading, list, button, table, film, replay, map, bars, strips, curves, warning, pairs (a table
+    whose rows stack on a phone); and, side by side where there is room: image, still.
     """
 
     kind: str
@@ -125,7 +125,13 @@ class Part:
         return [(name, list(run)) for name, run in groupby(self.blocks, key=_row)]
 
 
-_SCRIPTS = (("film", "player.js"), ("replay", "replay.js"), ("map", "map.js"), ("curves", "curves.js"))
+_SCRIPTS = (
+    ("film", "player.js"),
+    ("replay", "replay.js"),
+    ("map", "map.js"),
+    ("curves", "curves.js"),
+    ("live", "live.js"),
+)
 
 
 def _row(block: Block) -> str:
@@ -155,6 +161,11 @@ def heading(words: str) -> Block:
 def bullets(lines: Sequence[str]) -> Block:
     """A list."""
     return Block("list", lines=tuple(lines))
+
+
+def button(words: str, path: str) -> Block:
+    """A button that sends nothing but itself to a path of the page's own server."""
+    return Block("button", text=words, uri=path)
 
 
 def image(uri: str, title: str, caption: str = "", alt: str = "") -> Block:
@@ -215,13 +226,18 @@ def render(
     sections: Sequence[Section],
     opening: Section | None = None,
     replays: replays_of.Part | None = None,
+    live: bool = False,
 ) -> str:
-    """The page; of markup only `loop_picture`'s and `replay_page`'s is passed through."""
+    """The page; of markup only `loop_picture`'s and `replay_page`'s is passed through.
+
+    A `live` one looks at its own address again and again, and shows the sections that it finds there.
+    """
     environment = Environment(autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True)
     folder = files("bumblebee.report")
     every = [*sections, *([opening] if opening else [])]
     blocks = [block for section in every for block in section.blocks]
     kinds = {block.kind for block in blocks} | ({"replay"} if any(block.player for block in blocks) else set())
+    kinds |= {"live"} if live else set()
     script = "\n".join(folder.joinpath(file).read_text() for kind, file in _SCRIPTS if kind in kinds)
     return environment.from_string(folder.joinpath("page.html.j2").read_text()).render(
         title=title,
@@ -232,5 +248,6 @@ def render(
         style=Markup(folder.joinpath("page.css").read_text() + (style() if "replay" in kinds else "")),
         replays=holder(replays) if replays else "",
         script=Markup(script),
-        policy=policy(script),
+        policy=policy(script, live),
+        live=live,
     )

@@ -28,6 +28,7 @@ from bumblebee.wire.keys import HELP, Hand, encode_keys
 from bumblebee.wire.policy_process import READY
 from bumblebee.wire.screen import Numbers
 from bumblebee.wire.terminal import Terminal
+from bumblebee.wire.watcher import Watcher, facts_of
 
 _SAY, _DRAW = 0.05, 0.25  # s between two words to the guard, two pictures
 
@@ -51,6 +52,7 @@ def operate(
     journal: Path,
     about: Mapping[str, Any],
     say: Callable[[str], None] = lambda line: None,
+    watcher: Watcher | None = None,
 ) -> Ended:
     """Run a policy on the robot that was checked, to the end.
 
@@ -62,6 +64,7 @@ def operate(
         journal: new file.
         about: what the journal's first line says.
         say: told what happens, line by line.
+        watcher: who is shown the run, and may stop it.
 
     Raises:
         BadInput: the policy's process does not start.
@@ -79,7 +82,7 @@ def operate(
             say(HELP)
         try:
             with terminal.raw():
-                return _attend(Clock(job.slow), ours, writer, terminal, len(job.drives.joints), guard)
+                return _attend(job, ours, writer, terminal, guard, watcher or Watcher())
         finally:
             ours.close()  # the guard damps, and ends
             guard.wait()
@@ -87,15 +90,18 @@ def operate(
 
 
 def _attend(
-    clock: Clock, guard: socket.socket, writer: Writer, terminal: Terminal, joints: int, process: subprocess.Popen
+    job: Job, guard: socket.socket, writer: Writer, terminal: Terminal, process: subprocess.Popen, watcher: Watcher
 ) -> Ended:
     """Pass on keys and records until the guard has said its last word."""
-    numbers, hand, told = Numbers(joints), Hand(clock.now()), dict[str, Any]()
+    clock, numbers = Clock(job.slow), Numbers(len(job.drives.joints))
+    hand, told = Hand(clock.now()), dict[str, Any]()
     said = drawn = 0
     while True:
         now = clock.now()
         try:
             hand.press(terminal.pressed(), now)
+            if watcher.wants_stop():
+                hand.stop()
             if now - said >= _SAY * SECOND:
                 said = now
                 with suppress(packets.Gone):  # its last words are still to be read
@@ -108,7 +114,9 @@ def _attend(
                     told = json.loads(message[1:])
             if now - drawn >= _DRAW * SECOND:
                 drawn = now
-                terminal.draw([*numbers.lines(), HELP])
+                table = numbers.table()
+                terminal.draw([*numbers.lines(table), HELP])
+                watcher.show(facts_of(numbers, table, job.drives, job.plan.limits))
             select.select([guard.fileno(), *([0] if terminal.keys else [])], [], [], _SAY)
         except packets.Gone:
             break

@@ -13,6 +13,10 @@ from bumblebee.wire.rules import RULES, Step
 _KEEP = 200 * 60 * 20  # ticks whose durations are remembered: twenty minutes
 
 
+Table = dict[str, tuple[float, float, float]]
+"""Stage -> median, 99th percentile and worst [ms]."""
+
+
 class Numbers:
     """Durations and counts of a run so far.
 
@@ -27,6 +31,8 @@ class Numbers:
         """Rule -> ticks in which it asked for anything."""
         self.missed = 0
         """Deadlines of the guard that passed."""
+        self.count = 0
+        """Records so far."""
         self.row: Any = None
         """Newest record."""
         self._answer = -1
@@ -35,6 +41,7 @@ class Numbers:
         """Count records of the journal."""
         for row in np.frombuffer(records, self._layout):
             self.row = row
+            self.count += 1
             for name in STAGES:
                 self._note(name, row[name])
             self._note("wake to send", sum(int(row[name]) for name in STAGES[1:]))
@@ -45,13 +52,13 @@ class Numbers:
             self.missed += int(row["missed"])
             self.rules.update(name for bit, name in enumerate(RULES) if row["rules"] >> bit & 1)
 
-    def table(self) -> dict[str, tuple[float, float, float]]:
-        """Stage -> median, 99th percentile and worst [ms]."""
+    def table(self) -> Table:
+        """Durations so far."""
         rows = {name: np.frombuffer(times).copy() for name, times in self._times.items() if times}
         return {name: (*np.percentile(times, (50, 99)), times.max()) for name, times in rows.items()}
 
-    def lines(self) -> list[str]:
-        """A screen of a few lines."""
+    def lines(self, table: Table) -> list[str]:
+        """A screen of a few lines with the `table` of now."""
         if self.row is None:
             return ["waiting for the guard"]
         row, phase, step = self.row, Phase(self.row["phase"]).name, Step(self.row["step"]).name
@@ -61,9 +68,9 @@ class Numbers:
         head = (
             f"{phase:<6} {step:<5} tick {int(row['answers']):5d}, pelvis {height:.2f} m, torque up to {torque:.0f} N m"
         )
-        table = [f"{name:<13}{p50:8.2f}{p99:8.2f}{worst:8.2f}" for name, (p50, p99, worst) in self.table().items()]
+        stages = [f"{name:<13}{p50:8.2f}{p99:8.2f}{worst:8.2f}" for name, (p50, p99, worst) in table.items()]
         rules = ", ".join(f"{name} {count}" for name, count in self.rules.most_common(6)) or "none"
-        return [head + warmth, f"{'ms':<13}{'p50':>8}{'p99':>8}{'worst':>8}", *table,
+        return [head + warmth, f"{'ms':<13}{'p50':>8}{'p99':>8}{'worst':>8}", *stages,
                 f"missed ticks {self.missed}; rules: {rules}"]  # fmt: skip
 
     def _note(self, name: str, nanoseconds: int) -> None:

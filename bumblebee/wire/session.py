@@ -28,6 +28,7 @@ from bumblebee.wire.phases import Ramps
 from bumblebee.wire.plan import ORDER_HZ, Plan
 from bumblebee.wire.preflight import Wanted, check, meet, new_controller
 from bumblebee.wire.rollouts import new_id, rollout_of
+from bumblebee.wire.watcher import Watcher
 
 JOURNAL = ".journal"
 """Ending of a journal's name."""
@@ -51,8 +52,15 @@ class Run:
     operator: str = ""
 
 
-def run(job: Run, say: Callable[[str], None] = lambda line: None) -> tuple[Ended, Path | None]:
+def run(
+    job: Run, say: Callable[[str], None] = lambda line: None, watcher: Watcher | None = None
+) -> tuple[Ended, Path | None]:
     """Run a policy on a robot; how it ended, and the rollout, or None where the policy never carried the robot.
+
+    Args:
+        job: what is run.
+        say: told what happens, line by line.
+        watcher: who is shown the run, and may stop it.
 
     Raises:
         BadInput: anything that does not fit, before anything moves.
@@ -70,13 +78,17 @@ def run(job: Run, say: Callable[[str], None] = lambda line: None) -> tuple[Ended
     finally:
         link.close()
     check(card, state, wanted)
-    say(f"{card.name}, {'simulated' if card.simulated else 'REAL'}, {card.state_hz:g} states a second: nothing refused")
+    kind = "simulated" if card.simulated else "REAL"
+    if watcher:
+        about = {"policy": job.policy.name, "motion": job.clip.name, "frames": job.clip.frames}
+        watcher.show({"run": about | {"robot": f"{card.name}, {kind}"}})
+    say(f"{card.name}, {kind}, {card.state_hz:g} states a second: nothing refused")
     controller, frames = new_controller(), job.clip.frames
     numbers, rest = numbers_for(policy.sensors), (job.unattended, job.limits, job.ramps)
     plan = Plan(controller, card.robot, round(every), frames, wanted.hold, numbers, *rest)
     journal, about = _journal(job, policy, compensation)
     to_guard = Job(job.wire, job.at, job.slow, plan, wanted.drives)
-    ended = operate(to_guard, job.policy, job.clip, job.compensation, journal, about, say)
+    ended = operate(to_guard, job.policy, job.clip, job.compensation, journal, about, say, watcher)
     return ended, write_down(journal, job.out)
 
 

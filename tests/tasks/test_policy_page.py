@@ -18,6 +18,7 @@ from bumblebee.errors import EXIT_BAD_INPUT
 from bumblebee.motion.store import write_library
 from tasks import fetch, registry
 from tests.deploy.conftest import nod, policy_folder
+from tests.test_commands import run
 
 PAGE = Path(__file__).parents[2] / "docs" / "policy.md"
 CARD = "# expert-c0\n\nFollows a reference motion.\n"
@@ -116,6 +117,19 @@ def test_what_cannot_be_fetched_is_refused_in_one_line_and_nothing_is_written(
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
     assert sorted(path.name for path in workspace.iterdir()) == before and not (workspace / "data/.servers").exists()
+
+
+def test_a_champion_is_deployed_by_its_name_as_far_as_the_robot(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """It is fetched, its contract read, and the wire looked at, where nobody is; from any folder, nothing is left."""
+    monkeypatch.setattr("bumblebee.wire.preflight._PATIENCE", 0.05)
+    monkeypatch.chdir(tmp_path)
+    words = ["deploy", "run", "expert-c0@champion", "--workspace", str(workspace), "--clip", "squat", "--unattended"]
+    assert run(*words, "--at", tmp_path / "w") == EXIT_BAD_INPUT
+    said = capsys.readouterr()
+    assert "no person was asked about it" in said.out and "came nothing" in said.err
+    assert [path.name for path in tmp_path.iterdir()] == ["w"]
 
 
 def test_a_version_from_before_cards_is_fetched_too(workspace: Path, tmp_path: Path) -> None:

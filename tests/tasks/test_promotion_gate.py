@@ -2,6 +2,7 @@
 
 import getpass
 import json
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from bumblebee.errors import BadInput
 from bumblebee.learning.export import write_export
 from bumblebee.measured import gate, gate_record
 from bumblebee.tracking.library import AHEAD
+from bumblebee.wire.registered import let_through
 from flows.gate_cli import app
 from tasks import promotion_answer, promotion_gate, publish
 from tests.deploy.conftest import linear_onnx
@@ -240,3 +242,20 @@ def test_the_command_lists_shows_and_answers_it_under_the_login(registry: Regist
         typed("show", "../x")
     with pytest.raises(BadInput, match="expected a version that is proposed"):
         typed("show", "nothing-of-that-name")
+
+
+def test_only_the_file_that_people_approved_last_is_let_onto_a_robot(registry: Registry) -> None:
+    here, file = Path.cwd(), Path("models/generalist/policy.onnx")
+    assert "no person was asked" in let_through("generalist", file, here)
+    publish.main()
+    for verb, status in ((None, "no answer"), ("reject", "rejected"), ("more", "more")):
+        if verb:
+            say(verb, change=verb == "more")
+        with pytest.raises(BadInput, match=f"generalist.*came {status}") as refused:
+            let_through("generalist", file, here)
+    shown = str(refused.value).partition("Run: bumblebee gate ")[2]
+    assert CliRunner().invoke(app, shlex.split(shown)).exit_code == 0
+    assert say("approve", change=True)["status"] == "approved"
+    assert "approved by" in let_through("generalist", file, here)
+    with pytest.raises(BadInput, match="no answer"):
+        let_through("generalist", Path("params.yaml"), here)

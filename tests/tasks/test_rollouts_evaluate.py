@@ -234,3 +234,16 @@ def test_an_experts_success_is_one_curve_over_the_rounds() -> None:
         "nominal/expert-c0/success": {0: 0.2, 1: 0.6},
         "nominal/base/success": {0: 0.1},
     }
+
+
+@pytest.mark.parametrize(
+    ("wire", "module"), [("none", "bumblebee.deploy.stand_in"), ("lcm", "bumblebee.wire.stand_in")]
+)
+def test_the_settings_say_whether_the_stand_in_runs_over_the_wire(
+    wire: str, module: str, workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", f"motions: 1, wire: {wire},"))
+    started = list[list[str]]()
+    monkeypatch.setattr(rollouts, "start_stand_in", lambda *given, module: started.append(list(module)))
+    rollouts.main(round=1, cluster="c0")
+    assert started == [["-m", module]]

@@ -1,6 +1,5 @@
 """`bumblebee deploy`: what cannot be run is one line and status 2, and each line's remedy works as printed."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -34,10 +33,11 @@ def test_what_cannot_be_run_is_one_line(capsys: pytest.CaptureFixture[str], tmp_
     assert not out.exists()
 
 
-def test_a_registered_name_is_told_how_to_become_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
-    said = refused(capsys, "run", "expert-c0@champion", *ALONE)
-    (line,) = re.findall(r"Run: bumblebee (.*?); then", said)
-    assert run(*line.split(), "--help") == 0 and "registered" in capsys.readouterr().out.lower()
+def test_a_registered_name_without_a_registry_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """What fetching says is passed on; nothing is written."""
+    where = ("--workspace", tmp_path / "nowhere", "--out", tmp_path / "out")
+    said = refused(capsys, "run", "expert-c0@champion", *ALONE, *where)
+    assert "nowhere: expected a workspace" in said and list(tmp_path.iterdir()) == []
 
 
 def test_without_a_robot_a_simulated_one_can_be_started_as_the_line_says(
@@ -60,6 +60,6 @@ def test_a_run_that_a_rule_ended_says_so_by_its_status(
 
     for reason, status in (("tilt", cli_deploy.STOPPED), ("", 0)):
         ended = Ended(reason, Numbers(23), {"permitted": ["memory locked"], "refused": {}})
-        monkeypatch.setattr("bumblebee.wire.session.run", lambda job, say, ended=ended: (ended, None))
+        monkeypatch.setattr("bumblebee.wire.session.run", lambda job, say, watcher, ended=ended: (ended, None))
         assert run("deploy", "run", "shipped", *ALONE, "--out", tmp_path) == status
         assert ("stopped by the rule tilt" in capsys.readouterr().out) == bool(reason)

@@ -1,16 +1,27 @@
 """The console: what keys do, and the numbers that it shows."""
 
+import json
 import os
 import select
+import socket
 import termios
+import threading
+from pathlib import Path
 
 import numpy as np
 
-from bumblebee.wire.journal import Entry, record
-from bumblebee.wire.keys import END, GO, HELP, HOLD, OFF, Hand, decode_keys, encode_keys
+from bumblebee.wire import packets
+from bumblebee.wire.console import _attend
+from bumblebee.wire.guard_process import END as END_OF_RUN
+from bumblebee.wire.guard_process import RECORD
+from bumblebee.wire.job import Job
+from bumblebee.wire.journal import Entry, Writer, record
+from bumblebee.wire.keys import END, GO, HELP, HOLD, OFF, Hand, Keys, decode_keys, encode_keys
+from bumblebee.wire.phases import Phase
 from bumblebee.wire.screen import Numbers
 from bumblebee.wire.terminal import Terminal
-from tests.wire.small import Small, small_records
+from bumblebee.wire.watcher import STOP, Watcher
+from tests.wire.small import Small, drives, plan, small_records
 
 SECOND = 1_000_000_000
 
@@ -64,7 +75,7 @@ def test_keys_come_at_once_without_enter_and_the_terminal_is_as_it_was_afterward
 
 def test_numbers_are_those_of_all_records_and_fit_a_terminal() -> None:
     numbers = Numbers(3)
-    assert numbers.lines() == ["waiting for the guard"]
+    assert numbers.lines(numbers.table()) == ["waiting for the guard"]
     numbers.add(small_records(0.3))
     small = Small()
     small.run(0.1)
@@ -74,5 +85,46 @@ def test_numbers_are_those_of_all_records_and_fit_a_terminal() -> None:
     assert numbers.missed == 1 and numbers.table()["wake"][2] == 100.0
     p50, p99, worst = numbers.table()["wake to send"]
     assert worst == 2.0 and p99 == 2.0 and p50 in (0.0, 2.0)
-    lines = numbers.lines()
+    lines = numbers.lines(numbers.table())
     assert "missed ticks 1" in lines[-1] and max(map(len, lines)) < 120 and np.isfinite(worst)
+
+
+class Somebody:
+    """A guard that says what it was told, record by record, until it is told to stop."""
+
+    def __init__(self, end: socket.socket, watcher: socket.socket, before: bytes) -> None:
+        self._end, self._watcher, self._before, self.keys = end, watcher, before, list[Keys]()
+        self.returncode = 0
+        packets.send(end, RECORD + small_records(0.3))
+
+    def play(self) -> None:
+        while not self.keys or not self.keys[-1].stops:
+            assert select.select([self._end], [], [], 20.0)[0]
+            self.keys += map(decode_keys, packets.received(self._end))
+            if self.keys and self._before:
+                packets.send(self._watcher, self._before)
+                self._before = b""
+        packets.send(self._end, END_OF_RUN + json.dumps({"reason": "stop_key"}).encode())
+        self._end.close()
+
+    def wait(self) -> None:
+        """It has ended."""
+
+
+def test_a_watcher_sees_the_run_and_its_one_word_is_a_stop_key_and_nothing_more(tmp_path: Path) -> None:
+    (ours, end), (console, watching) = packets.pair(), packets.pair()
+    guard = Somebody(end, watching, STOP)
+    playing = threading.Thread(target=guard.play)
+    playing.start()
+    job, writer = Job("sim", "", 1.0, plan(), drives()), Writer(tmp_path / "a.journal", {"joints": list("abc")})
+    try:
+        ended = _attend(job, ours, writer, Terminal(os.open(os.devnull, os.O_RDONLY)), guard, Watcher(console))  # type: ignore[arg-type]
+    finally:
+        playing.join()
+        writer.close()
+    assert ended.reason == "stop_key" and guard.keys[-1].stops == 1
+    assert all(keys.goes == keys.ends == 0 and keys.held_ns == guard.keys[0].held_ns for keys in guard.keys)
+    facts = [json.loads(message) for message in packets.received(watching)]
+    assert (
+        facts[-1]["records"] == ended.numbers.count > 0 and facts[-1]["phase"] == Phase(ended.numbers.row["phase"]).name
+    )
