@@ -45,6 +45,23 @@ class Randomisation(Ranged):
 
 
 @dataclass(frozen=True)
+class SensorConfig(Ranged):
+    """Largest errors of a robot's sensors, drawn for each episode and the same through it; zeros: none."""
+
+    encoder_offset: Annotated[float, Range(least=0, most=0.5)] = 0.0
+    """Zero of each joint's encoder [rad]."""
+    imu_offset: Annotated[float, Range(least=0, most=0.5)] = 0.0
+    """Turn of the IMU in the base, about each axis [rad]: orientation and gyro are turned."""
+    gyro_bias: Annotated[float, Range(least=0, most=1)] = 0.0
+    """Bias of the gyro about each axis [rad/s]."""
+
+    @property
+    def any(self) -> bool:
+        """Whether there is any error."""
+        return bool(self.encoder_offset or self.imu_offset or self.gyro_bias)
+
+
+@dataclass(frozen=True)
 class Terrain(Ranged):
     """The ground that policies learn on (paper, table of domain randomisation: flat, rough)."""
 
@@ -137,6 +154,8 @@ class EnvConfig(Ranged):
     """The reward."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """Differences between the worlds."""
+    sensors: SensorConfig = field(default_factory=SensorConfig)
+    """Errors of the sensors that stay through an episode, in groups of observations that have noise."""
     terrain: Terrain = field(default_factory=Terrain)
     """The ground."""
 

@@ -25,6 +25,7 @@ from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_wo
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.sampler import ClipSampler, ClipShares
+from bumblebee.tracking.sensor_errors import SensorErrors
 from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
@@ -86,7 +87,9 @@ class TrackingEnv(VecEnv):
         self.ground = Ground(config.terrain, n, device) if config.terrain.rough else None
         wanted = {"policy": config.observation} | ({"student": config.student} if config.student.terms else {})
         sizes, noise = (n, j, len(library.ahead)), config.observation_noise
-        self.groups = {name: Group(own, sizes, noise, device, config.compile) for name, own in wanted.items()}
+        self.errors = SensorErrors(config.sensors, engine.model, n, device) if config.sensors.any else None
+        last = (noise, device, config.compile, self.errors)
+        self.groups = {name: Group(own, sizes, *last) for name, own in wanted.items()}
         self._critic = expanded(config.critic)
         self.episode_length_buf = torch.zeros(n, dtype=torch.long, device=device)
         self._clip, self._frame = torch.zeros_like(self.episode_length_buf), torch.zeros_like(self.episode_length_buf)
@@ -197,6 +200,8 @@ class TrackingEnv(VecEnv):
             kept |= {f"{group}_{name}": tensor for name, tensor in own.kept().items()}
         if self.ground is not None:
             kept["origin"] = self.ground.origin
+        if self.errors is not None:
+            kept["sensor_errors"] = self.errors.now
         return kept | {"episode_length": self.episode_length_buf, "failure": self.sampler.failure}
 
     def _shown(self) -> dict[str, Tensor]:
@@ -274,6 +279,8 @@ class TrackingEnv(VecEnv):
         if self.ground is not None:
             qpos = self.ground.place(rows, qpos, g)
         self.engine.reset(rows.chosen, qpos, qvel, ref.hold_pos)
+        if self.errors is not None:
+            self.errors.renew(rows, g)
         rows.put(self._clip, clip)
         rows.put(self._frame, frame)
         for tensor in (self._action, self._action_before, self.episode_length_buf):

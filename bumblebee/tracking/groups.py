@@ -12,6 +12,7 @@ from bumblebee.tracking.history import History
 from bumblebee.tracking.library import ReferenceFrame
 from bumblebee.tracking.noise import noise_levels
 from bumblebee.tracking.rows import Rows
+from bumblebee.tracking.sensor_errors import SensorErrors
 from bumblebee.tracking.terms import Part, expanded, parts, see
 
 Look = Callable[[RobotState, ReferenceFrame, Tensor], Tensor]
@@ -26,6 +27,7 @@ class Group:
         noise: factor on the sensor noise; with 0 the group is exact.
         device: where the robots' states are.
         compiled: whether torch compiles the terms.
+        errors: of the sensors, which stay through an episode, if any; a group whose own `noise` is 0 is exact.
     """
 
     def __init__(
@@ -35,6 +37,7 @@ class Group:
         noise: float,
         device: torch.device,
         compiled: bool = False,
+        errors: SensorErrors | None = None,
     ) -> None:
         worlds, joints, ahead = sizes
         self.parts: list[Part] = parts(config.terms, joints, ahead)
@@ -48,14 +51,16 @@ class Group:
         self._size = sum(size for _, size in self.parts)
         self.levels = levels.to(device) if bool(levels.any()) else None
         """Largest error (D + N,) of each entry of a control step; None: it is exact."""
-        kinds = 1 if self.levels is None else 2
+        self.errors = errors if config.noise else None
+        """Errors that stay through an episode; None: there are none."""
+        kinds = 1 if self.levels is None and self.errors is None else 2
         kept = kinds if config.history > 1 else 0
         self._worlds, self._stays = worlds, device.type == "cuda"
         self._rings = [History(worlds, self._size, config.history, device) for _ in range(kept)]
         whole = torch.zeros(worlds, config.history * self._size + len(levels) - self._size, device=device)
         self.exact = whole
         """(B, H * D + N) without noise, N of it the newest step's alone."""
-        self.noisy = whole if self.levels is None else whole.clone()
+        self.noisy = whole if kinds == 1 else whole.clone()
         """(B, H * D + N) as sensors would have it."""
 
     def draws(self, generator: torch.Generator) -> Tensor | None:
@@ -81,8 +86,13 @@ class Group:
         exact = self._look(state, ref, action)
         drawn = self.draws(generator) if begun is None else begun()
         rows = [exact]
+        read = exact
+        if self.errors is not None:
+            read = self._look(self.errors.read(state, self.errors.now), ref, action)
         if self.levels is not None and drawn is not None:
-            rows.append(torch.addcmul(exact, self.levels, drawn))
+            read = torch.addcmul(read, self.levels, drawn)
+        if read is not exact:
+            rows.append(read)
         if self._rings:
             for ring, row in zip(self._rings, rows, strict=True):
                 ring.add(row[:, : self._size], fresh)

@@ -112,11 +112,13 @@ class Imagination:
         """Imagine `horizon` control steps; rewards and the last observation have gradients to the weights of `act`."""
         first = (starts.body, starts.before, starts.action, starts.earlier)
         body, before, last, earlier = (tensor.requires_grad_() for tensor in first)  # as later steps': compiled once
+        sensors = self.env.groups["policy"].errors  # the memory holds true states, so any robot's errors fit them
+        errors = None if sensors is None else sensors.draw(len(body))
         *coming, final = self.references(starts.clip, starts.frame)
         keys, steps = self.state(body)[0].key_pos_w, []
         for ref, noise in zip(coming, self._noise(len(body)), strict=True):
             seen, after, keys, action, target, reward, lost = self._advanced(
-                act, model, body, keys, before, last, earlier, starts.context, ref, noise
+                act, model, body, keys, before, last, earlier, starts.context, ref, noise, errors
             )
             steps.append((seen, reward, lost))
             body, before, last, earlier = after, handed_on(target, before), action, last
@@ -140,6 +142,7 @@ class Imagination:
         context: Tensor,
         ref: ReferenceFrame,
         noise: Tensor | None,
+        errors: Tensor | None,
     ) -> tuple[Tensor, ...]:
         """One imagined control step.
 
@@ -149,7 +152,11 @@ class Imagination:
         """
         state = unpacked(body, keys)
         seen = see(self.terms, state, ref, last)
-        action = act(seen if noise is None else seen + noise)
+        sensors = self.env.groups["policy"].errors
+        read = seen
+        if sensors is not None and errors is not None:
+            read = see(self.terms, sensors.read(state, errors), ref, last)
+        action = act(read if noise is None else read + noise)
         target = self.targets(ref, action)
         after = model(body, target, before, context)
         step = self.step(state, after, target, (action, last, earlier), ref)
