@@ -32,7 +32,7 @@ Policy = Annotated[
     typer.Argument(metavar="POLICY", help="A policy's folder, NAME@ALIAS (registered), or shipped, randomised, imu."),
 ]
 Workspace = Annotated[
-    Path, typer.Option("--workspace", help="Of a registered policy: folder with .servers; by default this one.")
+    Path, typer.Option("--workspace", help="Folder with .servers, for a registered policy; by default this one.")
 ]
 Motions = Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")]
 Bounds = Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")]

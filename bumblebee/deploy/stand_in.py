@@ -62,7 +62,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Play:
-    """What a robot gets to do."""
+    """The work that a robot gets."""
 
     work: Work
     policies: dict[str, ExportedPolicy]

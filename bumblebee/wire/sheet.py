@@ -30,7 +30,7 @@ class Tried:
 
     motion: str
     sha256: str
-    """Of the clip's frames."""
+    """Share of the clip's frames."""
     seconds: float
     robots: int
     fell: int

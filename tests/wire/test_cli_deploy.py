@@ -34,7 +34,7 @@ def test_what_cannot_be_run_is_one_line(capsys: pytest.CaptureFixture[str], tmp_
 
 
 def test_a_registered_name_without_a_registry_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """What fetching says is passed on; nothing is written."""
+    """The line of fetching is passed on; nothing is written."""
     where = ("--workspace", tmp_path / "nowhere", "--out", tmp_path / "out")
     said = refused(capsys, "run", "expert-c0@champion", *ALONE, *where)
     assert "nowhere: expected a workspace" in said and list(tmp_path.iterdir()) == []
