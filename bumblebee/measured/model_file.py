@@ -39,7 +39,9 @@ def load_spec(path: Path) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compile()
     except Exception as error:  # ValueError mostly; FatalError and MemoryError from its allocations
-        raise BadInput(path, "an MJCF model that loads", str(error)[:300]) from None
+        lacks = "opening file" in str(error)  # a mesh or texture that was not copied along
+        do = "Put that file where the model names it: makers publish meshes beside their models." if lacks else ""
+        raise BadInput(path, "an MJCF model that loads", str(error)[:300], do) from None
     return spec
 
 

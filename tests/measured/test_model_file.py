@@ -4,8 +4,10 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 
-from bumblebee.measured.model_file import copy_model
+from bumblebee.errors import BadInput
+from bumblebee.measured.model_file import copy_model, load_spec
 
 MODEL = """<mujoco><compiler meshdir="meshes"/><asset><mesh name="tip" file="tip.obj"/></asset>
 <worldbody><body name="link"><joint name="hinge" axis="0 1 0"/>
@@ -35,3 +37,14 @@ def test_a_model_that_needs_nothing_beside_it_is_copied_as_it_is(tmp_path: Path)
     (tmp_path / "a.xml").write_text(text)
     copy_model(tmp_path / "a.xml", tmp_path / "b.xml")
     assert (tmp_path / "b.xml").read_text() == text
+
+
+def test_a_mesh_that_is_not_there_is_named_with_what_to_do(tmp_path: Path) -> None:
+    """As where a maker's model was copied without its folder of meshes."""
+    model = tmp_path / "arm.xml"
+    model.write_text(
+        "<mujoco><asset><mesh name='m' file='link.stl'/></asset>"
+        "<worldbody><body><joint/><geom type='mesh' mesh='m'/></body></worldbody></mujoco>"
+    )
+    with pytest.raises(BadInput, match=r"link\.stl.*Put that file where the model names it"):
+        load_spec(model)
