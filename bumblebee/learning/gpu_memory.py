@@ -84,6 +84,7 @@ def told(needs: Needs, robots: int, device: torch.device, say: bool) -> None:
     if device.type != "cuda":
         return
     free, total = torch.cuda.mem_get_info(device)
-    line = needs.line(robots, free, total)
+    aside = torch.cuda.memory_reserved(device) - torch.cuda.memory_allocated(device)  # torch's, of trainings before
+    line = needs.line(robots, free + aside, total)
     if say:
         print(line, flush=True)

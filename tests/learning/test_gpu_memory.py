@@ -112,3 +112,14 @@ def test_a_card_that_is_too_small_is_refused_in_one_line_whose_remedy_fits(
     else:
         made.config = replace(made.config, policy_batch=32)
         made._fit(needs_of(made))
+
+
+def test_what_torch_keeps_aside_from_earlier_trainings_counts_as_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = make_learner(PPO, env_of(TASK), tmp_path)
+    made.env.device = "cuda"
+    for name, value in {"mem_get_info": (0, 10**9), "memory_reserved": 6 * 10**8, "memory_allocated": 10**8}.items():
+        monkeypatch.setattr(torch.cuda, name, lambda device, value=value: value)
+    made._fit(needs_of(made))
+    assert capsys.readouterr().out.endswith("at 4 robots; the card has 0.5 of its 1.0 GB free\n")
