@@ -1,7 +1,7 @@
 """Errors of sensors that stay through an episode: what is seen follows their law, and nothing else changes."""
 
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import pytest
 import torch
@@ -100,9 +100,9 @@ def test_a_group_that_is_exact_by_its_own_noise_has_no_errors() -> None:
 
 def travelling(speed: tuple[float, float], robots: int, env: TrackingEnv) -> RobotState:
     """States of robots that go through the plane with this velocity [m/s]."""
-    state = replace(env.now[0], **{f.name: None for f in fields(RobotState) if f.name == "read_key_pos_w"})
-    first = {f.name: getattr(state, f.name) for f in fields(state)}
-    many = RobotState(**{name: None if v is None else v[:1].repeat_interleave(robots, 0) for name, v in first.items()})
+    now = env.now[0]
+    parts = (now.root_pos_w, now.root_quat_w, now.root_lin_vel_b, now.root_ang_vel_b, now.joint_pos, now.joint_vel)
+    many = RobotState(*(part[:1].repeat_interleave(robots, 0) for part in (*parts, now.key_pos_w)))
     world = torch.tensor([*speed, 0.0]).expand(robots, 3)
     return replace(many, root_lin_vel_b=rotate(conjugate(many.root_quat_w), world))
 
