@@ -1,4 +1,4 @@
-"""How much of a GPU's memory a training needs at least, known before it begins: what it keeps, and what updates hold.
+"""The least memory of a GPU that a training needs, known before it begins: tensors that it keeps, or holds in updates.
 
 Counted are tensors whose sizes follow from the settings. The simulator's own memory, which is taken before, the CUDA
 context, compiled code, workspaces and what torch keeps aside come on top, so that a training may need more than this.
@@ -23,7 +23,7 @@ class Needs:
     kept: Mapping[str, int]
     """Tensors that are there throughout."""
     passing: Mapping[str, int] = field(default_factory=dict)
-    """What single updates hold for their gradients, one after another."""
+    """Tensors that single updates hold for their gradients, one after another."""
 
     @property
     def least(self) -> int:

@@ -1,4 +1,4 @@
-"""What a training needs of a GPU at least, against the tensors that small trainers make."""
+"""The least memory of a GPU that a training needs, against the tensors that small trainers make."""
 
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""How much of a GPU's memory the learner through a model needs at least."""
+"""The least memory of a GPU that the learner through a model needs."""
 
 from collections.abc import Mapping
 
