@@ -37,7 +37,7 @@ class Needs:
         return max(every, key=every.__getitem__)
 
     def line(self, robots: int, free: int, total: int) -> str:
-        """What a training of so many `robots` needs, and what the card has [B].
+        """Need of a training of so many `robots` beside what the card has [B], in words.
 
         Raises:
             BadInput: if that does not fit into what is `free`.
