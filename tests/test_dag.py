@@ -56,6 +56,7 @@ NO_RESULT = {
     "bumblebee/io/": "reads within limits and writes whole: it refuses or passes, and changes no value",
     "bumblebee/ranges.py": "refuses settings; those that pass are among the parameters",
     "bumblebee/learning/checkpoint.py": "what a killed training goes on from",
+    "bumblebee/learning/gpu_memory.py": "refuses a GPU that is too small, or passes",
     "bumblebee/learning/curve.py": "the learning curve, to be looked at",
     "bumblebee/measured/metadata.py": "reads and writes files of rollouts: it refuses or passes",
     "bumblebee/measured/tables.py": "the same",

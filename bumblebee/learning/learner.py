@@ -17,6 +17,7 @@ import torch
 from bumblebee.errors import BadInput
 from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
 from bumblebee.learning.curve import CurveWriter
+from bumblebee.learning.gpu_memory import Needs, told
 from bumblebee.learning.policy import Policy, Shape, load_policy, shape_of
 from bumblebee.learning.ranks import Ranks
 from bumblebee.progress import progress
@@ -136,6 +137,14 @@ class Learner(ABC):
         """Identity of a checkpoint as plain values: the learner, the robot, and what its policy sees and gives."""
         shape = {name: _plain(value) for name, value in asdict(shape_of(self.env, self.config.hidden)).items()}
         return {"learner": self.name, "robot": ROBOT, **shape}
+
+    def _fit(self, needs: Needs) -> None:
+        """Say what the training needs of a GPU, on the first rank; a line for one that is too small."""
+        told(needs, self.env.num_envs, torch.device(self.env.device), self.ranks.first)
+
+    def _groups(self) -> dict[str, int]:
+        """Sizes of the observations by group."""
+        return {name: seen.shape[1] for name, seen in self.env.get_observations().items()}
 
     def _coming(self) -> int:
         """Control steps of all worlds of all ranks until the last iteration is done."""

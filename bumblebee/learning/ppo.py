@@ -17,6 +17,7 @@ from torch import nn
 from bumblebee.errors import BadInput
 from bumblebee.learning.bounded_ppo import BoundedPpo
 from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.gpu_memory import ppo_needs
 from bumblebee.learning.learner import Learner, parent_policy
 from bumblebee.learning.policy import Policy, model_config, new_actor, shape_of
 from bumblebee.learning.ranks import Ranks
@@ -83,6 +84,7 @@ class Trainer(Learner):
         if origin is not None:
             config = replace(config, hidden=origin.shape.hidden)
         super().__init__(env, config, folder, ranks)
+        self._fit(ppo_needs(config, env.num_envs, self._groups(), env.num_actions))
         torch.manual_seed(seed)
         on_gpu = torch.device(env.device).type == "cuda"
         if config.captured is None:

@@ -46,7 +46,10 @@ class Randomisation(Ranged):
 
 @dataclass(frozen=True)
 class SensorConfig(Ranged):
-    """Largest errors of a robot's sensors, drawn for each episode and the same through it; zeros: none."""
+    """Largest errors of a robot's sensors, drawn for each episode and the same through it; zeros: none.
+
+    Odometry drifts within an episode.
+    """
 
     encoder_offset: Annotated[float, Range(least=0, most=0.5)] = 0.0
     """Zero of each joint's encoder [rad]."""
@@ -54,11 +57,21 @@ class SensorConfig(Ranged):
     """Turn of the IMU in the base, about each axis [rad]: orientation and gyro are turned."""
     gyro_bias: Annotated[float, Range(least=0, most=1)] = 0.0
     """Bias of the gyro about each axis [rad/s]."""
+    odometry_scale: Annotated[float, Range(least=0, most=0.5)] = 0.0
+    """Standard deviation of the error of scale of the base's place by odometry; the stand-in robot's is 0.01."""
+    odometry_heading: Annotated[float, Range(least=0, most=0.5)] = 0.0
+    """Deviation after a second of the heading that odometry sums the way up with [rad], growing with the root of time;
+    the stand-in robot's is 0.005."""
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the base's place by odometry drifts from where an episode begins."""
+        return bool(self.odometry_scale or self.odometry_heading)
 
     @property
     def any(self) -> bool:
         """Whether there is any error."""
-        return bool(self.encoder_offset or self.imu_offset or self.gyro_bias)
+        return bool(self.encoder_offset or self.imu_offset or self.gyro_bias or self.drifts)
 
 
 @dataclass(frozen=True)

@@ -248,6 +248,8 @@ class TrackingEnv(VecEnv):
         else:
             over = Rows(self._dones, self.engine.by_mask)
             self.sampler.update(over.of(self._clip), over.of(lost), over.of(self._dones))
+        if self.errors is not None and self.errors.drifts:
+            self.errors.now.copy_(self.errors.after(self.errors.now, (self._state, state), self.dt, self._generator))
         self._restart(self._dones)
         self._push()
 

@@ -113,7 +113,7 @@ class Imagination:
         first = (starts.body, starts.before, starts.action, starts.earlier)
         body, before, last, earlier = (tensor.requires_grad_() for tensor in first)  # as later steps': compiled once
         sensors = self.env.groups["policy"].errors  # the memory holds true states, so any robot's errors fit them
-        errors = None if sensors is None else sensors.draw(len(body))
+        errors = None if sensors is None else sensors.under_way(len(body))
         *coming, final = self.references(starts.clip, starts.frame)
         keys, steps = self.state(body)[0].key_pos_w, []
         for ref, noise in zip(coming, self._noise(len(body)), strict=True):
@@ -121,6 +121,8 @@ class Imagination:
                 act, model, body, keys, before, last, earlier, starts.context, ref, noise, errors
             )
             steps.append((seen, reward, lost))
+            if sensors is not None and errors is not None:
+                errors = sensors.after(errors, (unpacked(body, keys), unpacked(after, keys)), self.env.dt)
             body, before, last, earlier = after, handed_on(target, before), action, last
         shown, rewards, losses = (torch.stack(each) for each in zip(*steps, strict=True))
         after = self._valued(see(self.terms, unpacked(body, keys), final, last), unpacked(body, keys), final, last)

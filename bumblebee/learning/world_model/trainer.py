@@ -19,6 +19,7 @@ from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.context import context_of
 from bumblebee.learning.world_model.dynamics import Dynamics, past_targets
+from bumblebee.learning.world_model.gpu_memory import world_model_needs
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.model_update import ModelUpdate
@@ -72,6 +73,8 @@ class WorldModelTrainer(Learner):
         context = context_of(env.engine.model, drawn, env.num_envs, self.ranks).to(device)
         delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
         past = past_targets(delay, env.dt)
+        sizes = (env.num_actions, past, context.shape[1])
+        self._fit(world_model_needs(config, env.num_envs, self._groups(), *sizes))
         model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1], past).to(device)
         self.memory = Memory(config.memory, context, env.num_actions, past)
         self.imagination = Imagination(env, config.horizon, config.compile)
