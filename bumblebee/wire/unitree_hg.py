@@ -57,7 +57,7 @@ def checksum(record: np.ndarray) -> int:
     return int(f"{mirrored:032b}"[::-1], 2)
 
 
-def command(order: Order, mode_machine: int, wrists: np.ndarray, kp: float = 40.0, kd: float = 1.0) -> np.ndarray:
+def command(order: Order, mode_machine: int, wrists: np.ndarray, kp: float, kd: float) -> np.ndarray:
     """LowCmd_ of an order for our 23 joints.
 
     Args:

@@ -38,7 +38,7 @@ def test_messages_are_as_long_as_the_vendors_and_lie_where_its_format_puts_them(
             struct.calcsize("<2I2B2xI" + "13fh2x" + "B3x4f2hf7I" * 35 + "40B5I"),
         )
     )
-    mode_pr, machine, *read = struct.unpack(FORMAT, command(order(), 5, WRISTS).tobytes())
+    mode_pr, machine, *read = struct.unpack(FORMAT, command(order(), 5, WRISTS, 40.0, 1.0).tobytes())
     assert (mode_pr, machine) == (0, 5)
     knee = read[7 * 3 : 7 * 4]
     at = joint_names().index("left_knee_joint")
@@ -46,7 +46,7 @@ def test_messages_are_as_long_as_the_vendors_and_lie_where_its_format_puts_them(
 
 
 def test_the_checksum_is_that_of_shifts_over_all_words_but_the_last() -> None:
-    sent = command(order(), 5, WRISTS)
+    sent = command(order(), 5, WRISTS, 40.0, 1.0)
     assert int(sent["crc"]) == bit_by_bit(sent.tobytes())
     changed = sent.copy()
     changed["reserve"][3] = 1
@@ -56,14 +56,14 @@ def test_the_checksum_is_that_of_shifts_over_all_words_but_the_last() -> None:
 def test_23_of_29_motors_are_ours_and_the_wrists_are_held_where_they_were() -> None:
     assert len(MOTORS) == 29 and tuple(MOTORS[slot] for slot in OURS) == joint_names()
     assert all("wrist" in MOTORS[slot] for slot in HELD) and len(HELD) == 6
-    motors = command(order(), 5, WRISTS)["motor_cmd"]
+    motors = command(order(), 5, WRISTS, 40.0, 1.0)["motor_cmd"]
     np.testing.assert_allclose(motors["q"][HELD], WRISTS, rtol=1e-6)
     assert (motors["kp"][HELD] > 0).all() and (motors["kd"][HELD] > 0).all() and (motors["tau"][HELD] == 0).all()
     assert motors["mode"].tolist() == [1] * 29 + [0] * 6
 
 
 def test_damping_has_kd_alone_and_off_no_motor() -> None:
-    damps, off = (command(order(mode), 5, WRISTS)["motor_cmd"] for mode in (Mode.DAMP, Mode.OFF))
+    damps, off = (command(order(mode), 5, WRISTS, 40.0, 1.0)["motor_cmd"] for mode in (Mode.DAMP, Mode.OFF))
     assert not damps["kp"].any() and not damps["tau"].any() and (damps["kd"][:29] > 0).all()
     assert not any(off[name].any() for name in ("mode", "kp", "kd", "tau"))
 
