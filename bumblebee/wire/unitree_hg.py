@@ -1,7 +1,7 @@
 """Unitree's `unitree_hg` messages of a G1 as NumPy records: layout, checksum, and which of the 29 motors are ours.
 
 Facts of the vendor's IDL (LowCmd_ on rt/lowcmd, LowState_ on rt/lowstate), as its checksum lays them out:
-little-endian, four-byte aligned, 35 motor slots. No wire carries them yet: this is the part that needs no library.
+little-endian, four-byte aligned, 35 motor slots. `unitree_link` carries them.
 """
 
 import zlib
@@ -43,6 +43,8 @@ LOW_STATE = np.dtype(
     [("version", "<u4", (2,)), *_MODES, ("tick", "<u4"), _IMU_STATE, _MOTOR_STATES, _REMOTE, _RESERVE, _CRC]
 )
 """LowState_, 2,092 bytes; quaternion wxyz, gyroscope [rad/s] in the base frame."""
+_NAMES = {LOW_CMD: "LowCmd_", LOW_STATE: "LowState_"}
+_BREAKS = {LOW_CMD: 2, LOW_STATE: 70}  # where the first motor begins in DDS; two bytes later in a record
 _MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
@@ -83,18 +85,29 @@ def command(order: Order, mode_machine: int, wrists: np.ndarray, kp: float, kd: 
     return sent
 
 
-def read_low_state(message: bytes) -> np.ndarray:
-    """LowState_ from its bytes.
+def as_cdr(record: np.ndarray) -> bytes:
+    """Body of a message as DDS sends it: a struct begins where its first member may, so four pad bytes less."""
+    data, at = record.tobytes(), _BREAKS[record.dtype]
+    return data[:at] + data[at + 2 : at + 4] + data[at + 6 :]
+
+
+def from_cdr(body: bytes, layout: np.dtype) -> np.ndarray:
+    """Message from its body; a checksum is the only thing that is refused beside a length.
+
+    Args:
+        body: as from `as_cdr`.
+        layout: `LOW_CMD` or `LOW_STATE`.
 
     Returns:
-        () `LOW_STATE`.
+        () of that layout.
 
     Raises:
         BadInput: another length, or a checksum that is not that of the bytes.
     """
-    if len(message) != LOW_STATE.itemsize:
-        raise BadInput("unitree: LowState_", f"{LOW_STATE.itemsize} bytes", str(len(message)))
-    state = np.frombuffer(message, LOW_STATE)[0]
-    if int(state["crc"]) != checksum(state):
-        raise BadInput("unitree: LowState_: crc", f"{checksum(state):#010x}", f"{int(state['crc']):#010x}")
-    return state
+    at, name = _BREAKS[layout], _NAMES[layout]
+    if len(body) != layout.itemsize - 4:
+        raise BadInput(f"unitree: {name}", f"{layout.itemsize - 4} bytes", str(len(body)))
+    record = np.frombuffer(body[:at] + bytes(2) + body[at : at + 2] + bytes(2) + body[at + 2 :], layout)[0]
+    if int(record["crc"]) != checksum(record):
+        raise BadInput(f"unitree: {name}: crc", f"{checksum(record):#010x}", f"{int(record['crc']):#010x}")
+    return record

@@ -8,7 +8,7 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joint_names
 from bumblebee.wire.messages import Mode, Order, layout_of
-from bumblebee.wire.unitree_hg import HELD, LOW_CMD, LOW_STATE, MOTORS, OURS, checksum, command, read_low_state
+from bumblebee.wire.unitree_hg import HELD, LOW_CMD, LOW_STATE, MOTORS, OURS, as_cdr, checksum, command, from_cdr
 
 WRISTS = np.linspace(-0.3, 0.3, 6)
 FORMAT = "<2B2x" + "B3x5fI" * 35 + "5I"
@@ -73,9 +73,12 @@ def test_a_state_that_is_torn_or_of_another_length_is_refused() -> None:
     state["imu_state"]["quaternion"] = [1, 0, 0, 0]
     state["motor_state"]["q"][OURS] = np.arange(23)
     state["crc"] = checksum(state)
-    read = read_low_state(state.tobytes())
+    read = from_cdr(as_cdr(state), LOW_STATE)
     assert read["imu_state"]["quaternion"].tolist() == [1, 0, 0, 0]
     assert read["motor_state"]["q"][OURS].tolist() == list(range(23))
-    for message, expected in ((state.tobytes()[:-1], "2092 bytes"), (b"\1" + state.tobytes()[1:], "crc")):
+    for message, expected in ((as_cdr(state)[:-1], "2088 bytes"), (b"\1" + as_cdr(state)[1:], "crc")):
         with pytest.raises(BadInput, match=expected):
-            read_low_state(message)
+            from_cdr(message, LOW_STATE)
+    sent = command(order(), 5, WRISTS, 40.0, 1.0)
+    assert from_cdr(as_cdr(sent), LOW_CMD) == sent
+    assert len(as_cdr(sent)) == struct.calcsize("<3Bx5fI" + "B3x5fI" * 34 + "5I")
