@@ -176,12 +176,13 @@ def _kind(name: str, layout: np.dtype) -> Any:
     from cyclonedds.idl import types as idl
     from cyclonedds.idl.annotations import autoid, final
 
-    hints = {}
+    hints: dict[str, Any] = {}
+    array: Any = idl.array
     for field in (name for name in layout.names or () if name != "pad"):
         one = layout[field]
         base = one.base
         kind = _kind(_TYPES[field], base) if base.names else getattr(idl, _SCALARS[base.str[1:]])
-        hints[field] = idl.array[kind, one.shape[0]] if one.shape else kind
+        hints[field] = array[kind, one.shape[0]] if one.shape else kind
 
     def serialize(self: Any, *_: Any, use_version_2: bool = False, **__: Any) -> bytes:
         return (b"\0\7\0\0" if use_version_2 else b"\0\1\0\0") + self.body

@@ -59,6 +59,11 @@ def test_packets_stay_whole_and_say_when_the_other_side_is_gone() -> None:
     assert all(packets.send(other, bytes([k]) * 2000) for k in range(50))
     other.close()
     assert packets.received(one) == [bytes([k]) * 2000 for k in range(50)]
+    one, other = packets.pair()
+    packets.send(one, b"nobody reads this")
+    packets.send(other, b"last word")
+    other.close()
+    assert packets.received(one) == [b"last word"]
     for gone in (lambda: packets.received(one), lambda: packets.send(one, b"x")):
         with pytest.raises(packets.Gone):
             gone()
