@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 STOPPED = 4
 """Exit status of a run that a safety rule ended."""
 app = typer.Typer(add_completion=False, no_args_is_help=True, help="Run a policy on a robot, over a wire.")
-_WIRES = "sim (sockets of this machine) or lcm."
-At = Annotated[str, typer.Option("--at", help="Address of the wire: a folder for sim, an LCM URL for lcm.")]
+_WIRES = "sim (sockets of this machine), lcm, or unitree (its own DDS)."
+At = Annotated[str, typer.Option("--at", help="Address of the wire: a folder for sim, a URL for lcm and unitree.")]
 Slow = Annotated[
     float, typer.Option("--slow", min=1, max=100, help="Times slower than real time, the same on both sides.")
 ]

@@ -1,12 +1,13 @@
-"""Wires: the two ways that a message goes from one process to all others that listen on its channel."""
+"""Wires: the ways that a message goes from one process to all others that listen on its channel."""
 
 from collections.abc import Sequence
 from typing import Protocol
 
 from bumblebee.errors import BadInput
 
-WIRES = ("sim", "lcm")
-"""`sim`: sockets of this machine, nothing to install; `lcm`: UDP multicast, the package lcm."""
+WIRES = ("sim", "lcm", "unitree")
+"""`sim`: sockets of this machine, nothing to install; `lcm`: UDP multicast, the package lcm; `unitree`: the vendor's
+messages over DDS, the package cyclonedds."""
 
 
 class Link(Protocol):
@@ -31,7 +32,8 @@ def open_link(wire: str, listen: Sequence[str], at: str = "") -> Link:
     Args:
         wire: one of `WIRES`.
         listen: channels to listen to.
-        at: address, `""` for the usual one: a folder for `sim`, an LCM URL for `lcm`.
+        at: address, `""` for the usual one: a folder for `sim`, an LCM URL for `lcm`, `dds://ADDRESS?kp=...&kd=...` for
+            `unitree`.
 
     Raises:
         BadInput: no such wire, no such address, or a package that is missing.
@@ -44,4 +46,8 @@ def open_link(wire: str, listen: Sequence[str], at: str = "") -> Link:
         from bumblebee.wire.lcm_link import LcmLink
 
         return LcmLink(at, listen)
+    if wire == "unitree":
+        from bumblebee.wire.unitree_link import UnitreeLink
+
+        return UnitreeLink(at, listen)
     raise BadInput("--robot", " or ".join(WIRES), repr(wire)[:40])

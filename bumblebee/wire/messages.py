@@ -64,7 +64,7 @@ class State:
     heard: int
     """Sequence of the order in force; -1 for none."""
     heard_ns: int
-    """When that order came, by the robot's clock [ns]."""
+    """When that order came, by the robot's clock [ns]; -1 where it does not say."""
 
 
 @dataclass(frozen=True)

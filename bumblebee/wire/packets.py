@@ -48,8 +48,8 @@ def received(end: socket.socket) -> list[bytes]:
         while True:
             try:
                 message = end.recv(_MOST)
-            except ConnectionResetError:
-                message = b""
+            except ConnectionResetError:  # said once, before what is still to be read: it left some of ours unread
+                continue
             if not message:
                 if found:
                     return found

@@ -96,7 +96,7 @@ def _taken(rows: np.ndarray, ask: int) -> float | None:
         return None
     order = rows["order"][ask + 1 + int(np.argmax(number))]
     after = rows[ask + 1 : ask + 41]
-    exact = after["heard"] == order
+    exact = (after["heard"] == order) & (after["heard_ns"] >= 0)
     return float(after["heard_ns"][np.argmax(exact)] - rows["robot_ns"][ask]) * 1e-9 if exact.any() else None
 
 

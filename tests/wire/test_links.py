@@ -1,5 +1,6 @@
 """Wires: all who listen on a channel get what is sent on it, in order, and nobody else."""
 
+import importlib.util
 import os
 import stat
 import sys
@@ -23,11 +24,17 @@ def lcm_here() -> bool:
     return True
 
 
+def dds_here() -> bool:
+    return importlib.util.find_spec("cyclonedds") is not None
+
+
 WIRES = ["sim", pytest.param("lcm", marks=pytest.mark.skipif(not lcm_here(), reason="no lcm, or no multicast here"))]
 
 
 def address(wire: str, tmp_path: Path) -> str:
     """One of its own for each test."""
+    if wire == "unitree":
+        return f"dds://127.0.0.1?domain={1 + uuid.uuid4().int % 200}&kp=40&kd=1"
     return str(tmp_path / "w") if wire == "sim" else f"udpm://239.255.76.67:{20000 + uuid.uuid4().int % 40000}?ttl=0"
 
 

@@ -6,7 +6,6 @@ import os
 import socket
 import subprocess
 import sys
-import uuid
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.learning.export import export_shipped
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.wire import packets
 from bumblebee.wire.clock import Clock
@@ -34,7 +34,7 @@ from tests.deploy.conftest import nod
 from tests.wire.conftest import SHORT
 from tests.wire.made import state
 from tests.wire.small import answer_to, drives, plan
-from tests.wire.test_links import lcm_here
+from tests.wire.test_links import address, dds_here, lcm_here
 
 HOME = Path(__file__).parents[2]
 SLOW = 4.0
@@ -59,6 +59,11 @@ def test_packets_stay_whole_and_say_when_the_other_side_is_gone() -> None:
     assert all(packets.send(other, bytes([k]) * 2000) for k in range(50))
     other.close()
     assert packets.received(one) == [bytes([k]) * 2000 for k in range(50)]
+    one, other = packets.pair()
+    packets.send(one, b"nobody reads this")
+    packets.send(other, b"last word")
+    other.close()
+    assert packets.received(one) == [b"last word"]
     for gone in (lambda: packets.received(one), lambda: packets.send(one, b"x")):
         with pytest.raises(packets.Gone):
             gone()
@@ -164,25 +169,27 @@ def test_the_policys_process_answers_the_newest_question_and_ends_with_its_guard
 
 
 LCM = pytest.param("lcm", marks=[pytest.mark.slow, pytest.mark.skipif(not lcm_here(), reason="no lcm or multicast")])
+DDS = pytest.param("unitree", marks=[pytest.mark.slow, pytest.mark.skipif(not dds_here(), reason="no cyclonedds")])
 
 
-@pytest.mark.parametrize("wire", ["sim", LCM])
+@pytest.mark.parametrize("wire", ["sim", LCM, DDS])
 def test_a_policy_runs_a_robot_in_another_process_and_its_log_is_a_dataset(
     wire: str, shipped: ExportedPolicy, tmp_path: Path
 ) -> None:
-    at = str(tmp_path / "w") if wire == "sim" else f"udpm://239.255.76.67:{20000 + uuid.uuid4().int % 40000}?ttl=0"
+    at, policy = address(wire, tmp_path), shipped.folder
+    if wire == "unitree":  # LowState_ has no odometry
+        policy = export_shipped(tmp_path / "policy", "imu")
     code = (
         "from bumblebee.wire.robot_process import run_robot; from bumblebee.wire.robot import RobotSettings\n"
         f"run_robot({wire!r}, {at!r}, [], RobotSettings(state_hz=250), {SLOWER}, 60.0, print)"
     )
-    words, env = [sys.executable, "-u", "-c", code], os.environ | {"PYTHONPATH": str(HOME)}
+    words, places = [sys.executable, "-u", "-c", code], os.pathsep.join((str(HOME), *sys.path))
+    env = os.environ | {"PYTHONPATH": places}
     robot = subprocess.Popen(words, cwd=HOME, env=env, stdout=subprocess.PIPE)
     assert robot.stdout is not None
     try:
         robot.stdout.readline()  # it is there
-        job = Run(
-            shipped.folder, nod(frames=12), wire, tmp_path / "set", at, None, PATIENT, SHORT, True, SLOWER, "a test"
-        )
+        job = Run(policy, nod(frames=12), wire, tmp_path / "set", at, None, PATIENT, SHORT, True, SLOWER, "a test")
         ended, path = run(job)
     finally:
         robot.kill()
