@@ -119,17 +119,10 @@ def run(options: argparse.Namespace) -> int:
         return 0
     trainer.policy().save(options.out)
     print(f"trained {trainer.frames / 1e6:.1f} M steps in {trainer._seconds / 60:.1f} min", flush=True)
-    print(
-        "model, RMS in held-out worlds: " + ", ".join(f"{name} {value:.1f}" for name, value in errors.items()),
-        flush=True,
-    )
+    print("model, RMS in held-out worlds:", ", ".join(f"{n} {value:.1f}" for n, value in errors.items()), flush=True)
     if options.jobs and done():
-        report(
-            [Tried("world_model", options.out, Manner(settings.env.observation))],
-            options.motions,
-            options.out,
-            options.jobs,
-        )
+        tried = Tried("world_model", options.out, Manner(settings.env.observation))
+        report([tried], options.motions, options.out, options.jobs)
     return 0
 
 

@@ -110,8 +110,6 @@ def run(
 ) -> None:
     """Check robot and policy, stand up slowly, run one clip, damp; the log is a dataset of measured rollouts."""
     from bumblebee.deploy.policy import ExportedPolicy
-    from bumblebee.io.write import write_file
-    from bumblebee.view.after_page import after_page
     from bumblebee.view.operator_process import operator_page
     from bumblebee.wire.limits import Limits, read_limits
     from bumblebee.wire.session import Run
@@ -135,10 +133,7 @@ def run(
             ended, rollout = go(job, _say, watcher)
             _tell(ended, rollout)
             if rollout:
-                after = out / "pages" / f"{rollout.stem}.html"
-                counts, missed = dict(ended.numbers.rules.most_common()), ended.numbers.missed
-                write_file(after, after_page(ended.reason, counts, missed, rollout, out, workspace))
-                _say(f"written: {after}")
+                after = _write_after(ended, rollout, out, workspace)
                 if watcher and not unattended:
                     watcher.show({"after": str(after.resolve())})
                     with suppress(EOFError, KeyboardInterrupt):
@@ -156,6 +151,18 @@ def _tell(ended: "Ended", rollout: Path | None) -> None:
     print("\n".join(ended.numbers.lines(ended.numbers.table())[1:]))
     print(f"guard: {', '.join(ended.told['permitted'])}; refused states: {ended.told['refused'] or 'none'}")
     print(f"written: {rollout}" if rollout else "nothing measured: the policy did not carry the robot", flush=True)
+
+
+def _write_after(ended: "Ended", rollout: Path, out: Path, workspace: Path) -> Path:
+    """Write the page of what came."""
+    from bumblebee.io.write import write_file
+    from bumblebee.view.after_page import after_page
+
+    after = out / "pages" / f"{rollout.stem}.html"
+    counts, missed = dict(ended.numbers.rules.most_common()), ended.numbers.missed
+    write_file(after, after_page(ended.reason, counts, missed, rollout, out, workspace))
+    _say(f"written: {after}")
+    return after
 
 
 @app.command("robot")

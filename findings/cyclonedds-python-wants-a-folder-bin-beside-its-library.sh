@@ -9,9 +9,9 @@ trap 'rm -rf "$here"' EXIT
 cd "$here"
 apt-get download -q $(apt-cache depends --recurse --no-recommends --no-suggests --no-conflicts --no-breaks --no-replaces --no-enhances \
   cyclonedds-dev=0.10.2-2 | grep -E '^(cyclonedds|lib(cyclonedds|ddsc))' | sort -u) >/dev/null
-for package in *.deb; do dpkg -x "$package" root; done
+for package in *.deb; do dpkg -x "$package" debian; done
 python3 -m venv venv
-usr=$here/root/usr lib=$here/root/usr/lib/$(gcc -print-multiarch)
+usr=$here/debian/usr lib=$here/debian/usr/lib/$(gcc -print-multiarch)
 install() { CYCLONEDDS_HOME=$1 venv/bin/pip install -q --no-deps --no-cache-dir cyclonedds==0.10.2 > log 2>&1; }
 mkdir two three
 ln -s "$usr/include" two/include && ln -s "$lib" two/lib
