@@ -12,6 +12,7 @@ for name, value in {
     "BUMBLEBEE_CACHE": "",
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
+    "OMP_THREAD_LIMIT": "1",  # whatever a training asks torch for: threads that wait for each other spin meanwhile
 }.items():
     os.environ[name] = value
 for name in ("DVC_STAGE", "DVC_ROOT", "PREFECT_API_URL", "MLFLOW_TRACKING_URI"):
