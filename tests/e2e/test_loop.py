@@ -31,7 +31,8 @@ from tasks import registry
 
 pytestmark = pytest.mark.e2e
 LIMIT = 600  # [s] for any one command
-ITERATIONS = 16  # of the base policy
+ITERATIONS = 60  # of the base policy
+FEW = {"env": {"num_worlds": 8}}
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,8 @@ def run_until_base_and_kill(folder: Path) -> tuple[str, list[str]]:
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
     over = {
         "gate": {"mode": "ask"},
-        "base": {"ppo": {"iterations": ITERATIONS}},  # long enough for the kill to come before its end
+        "base": {**FEW, "ppo": {"iterations": ITERATIONS}},  # long enough for the kill to come before its end
+        **dict.fromkeys(("experts", "refine", "distill"), FEW),
         # Time for the first effect: the whole search takes half a minute or several, by what was sealed and measured.
         "diagnose": {"search_seconds": 5.0, "beyond_seconds": 1.0},
         "control": {"kinds": ["delta"]},  # all that the other kind does, and more
