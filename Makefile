@@ -10,6 +10,8 @@ VERBOSE ?=
 
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.bumblebee-installed
+# File by file in three processes: on two cores one computes while another waits for a program or a server.
+TESTS = $(BIN)/python -m pytest -q -n 3 --dist loadfile --no-loadscope-reorder
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -66,13 +68,13 @@ serve: setup  ## open both servers again, with runs started and resumed from Pre
 	@$(BIN)/python -m flows.serve $(if $(NAME),--name "$(NAME)") $(PORTS)
 
 test: setup check  ## style, import rule, unit tests, the loop end to end; the slow suites are left to test-all
-	$(BIN)/python -m tests.halves -m "not slow"
+	$(TESTS) -m "not slow"
 
 test-all: setup check  ## every test, the slow suites too; a job runs it each night
-	$(BIN)/python -m tests.halves
+	$(TESTS)
 
 unit: setup  ## the tests without the end-to-end run and the slow suites
-	$(BIN)/python -m tests.halves -m "not e2e and not slow"
+	$(TESTS) -m "not e2e and not slow"
 
 e2e: setup  ## the end-to-end run alone
 	$(BIN)/python -m pytest -q -m e2e

@@ -2,6 +2,8 @@
 
 import os
 
+import pytest
+
 for name, value in {
     "DO_NOT_TRACK": "true",
     "MLFLOW_DISABLE_TELEMETRY": "true",
@@ -17,3 +19,8 @@ for name, value in {
     os.environ[name] = value
 for name in ("DVC_STAGE", "DVC_ROOT", "PREFECT_API_URL", "MLFLOW_TRACKING_URI"):
     os.environ.pop(name, None)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The end-to-end run first: it is the longest file, and what begins last is waited for."""
+    items.sort(key=lambda item: item.get_closest_marker("e2e") is None)

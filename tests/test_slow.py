@@ -1,13 +1,8 @@
-"""Tests that `make test` leaves to `make test-all` are listed here, and both halves together are all tests."""
+"""Tests that `make test` leaves to `make test-all` are listed here; all others run in both."""
 
 import ast
-import sys
 import tomllib
 from pathlib import Path
-
-import pytest
-
-from tests import halves
 
 HOME = Path(__file__).parent.parent
 ALL_SLOW: set[str] = set()
@@ -45,28 +40,8 @@ def test_only_make_test_leaves_the_slow_ones_out_and_the_nightly_job_runs_all():
     options = tomllib.loads((HOME / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
     assert " -m" not in options["addopts"] and "--ignore" not in options["addopts"]
     lines = (HOME / "Makefile").read_text().splitlines()
-    recipe = {
-        line.partition(":")[0]: lines[k + 1] for k, line in enumerate(lines) if line.startswith(("test:", "test-all:"))
-    }
-    assert recipe["test"].endswith('tests.halves -m "not slow"')
-    assert recipe["test-all"].endswith("tests.halves")
+    recipe = {line.partition(":")[0]: lines[k + 1] for k, line in enumerate(lines) if line.startswith("test")}
+    assert recipe == {"test": '\t$(TESTS) -m "not slow"', "test-all": "\t$(TESTS)"}
+    (tests,) = (line for line in lines if line.startswith("TESTS "))
+    assert " -m pytest -q -n " in tests and not {"-k", "--ignore", "--deselect"} & set(tests.split())
     assert "make test-all" in (HOME / ".github" / "workflows" / "nightly.yml").read_text()
-
-
-def test_both_halves_together_are_all_tests():
-    apart, rest = halves.commands([])
-    assert tuple(apart[-len(halves.PROCESSES) :]) == halves.PROCESSES
-    assert rest[-1] == "tests" and {word.partition("=")[2] for word in rest if "--ignore" in word} == set(
-        halves.PROCESSES
-    )
-    assert all((HOME / path).is_dir() for path in halves.PROCESSES)
-
-
-def test_a_half_that_fails_fails_both_and_what_it_said_is_shown(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-):
-    good, bad = ([sys.executable, "-c", f"print('said {n}'); raise SystemExit({n})"] for n in (0, 1))
-    for both, wanted in (((good, good), 0), ((good, bad), 1), ((bad, good), 1)):
-        monkeypatch.setattr(halves, "commands", lambda options, both=both: both)
-        assert halves.main([]) == wanted
-        assert capfd.readouterr().out.count("said") == 2
