@@ -1,5 +1,6 @@
 """Surroundings of all tests: no network, no telemetry, one thread, nothing of the user's own settings."""
 
+import gc
 import os
 
 import pytest
@@ -24,3 +25,8 @@ for name in ("DVC_STAGE", "DVC_ROOT", "PREFECT_API_URL", "MLFLOW_TRACKING_URI"):
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The end-to-end run first: it is the longest file, and what begins last is waited for."""
     items.sort(key=lambda item: item.get_closest_marker("e2e") is None)
+
+
+def pytest_collection_finish() -> None:
+    """What was imported stays to the end: the garbage collector need not look through it each time."""
+    gc.freeze()

@@ -3,8 +3,10 @@
 import pytest
 
 from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
+from bumblebee.diagnosis.simulation import simulate as simulating
 from tests.diagnosis.arm import SMALL, session_of, simulate
 
+simulating.THREADS = 1  # tests run side by side
 _made: dict[tuple, Diagnosis] = {}
 
 
