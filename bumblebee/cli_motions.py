@@ -258,8 +258,8 @@ def _claim_picture(out: Path, path: Path) -> None:
     from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
     from bumblebee.report.film_file import require_film
 
-    require_film(out, (".png",))
     refuse_overlap(out, [path])
+    require_film(out, (".png",))
     refuse_existing(out)
     try_output(out)
 

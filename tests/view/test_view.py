@@ -169,7 +169,8 @@ def test_a_film_of_what_is_shown_plays_at_real_speed_and_moves(tmp_path: Path, c
         shown = []
         for number in range(film.n_frames):
             film.seek(number)
-            shown.append((film.info["duration"], np.asarray(film.convert("RGB")).astype(int)))
+            picture = np.asarray(film.convert("RGB")).astype(int)  # read first: only then a WebP knows its duration
+            shown.append((film.info["duration"], picture))
     assert len(shown) == 7 and sum(length for length, _ in shown) == pytest.approx(7 * 80, abs=60)
     assert np.abs(shown[0][1] - shown[-1][1]).max() > 100 and (shown[0][1] < 100).any()
 
