@@ -1,4 +1,4 @@
-"""What the servers' pages show first: MLflow its registered models, Prefect's login where its password is.
+"""First views of the servers' pages: MLflow opens its registered models, Prefect's login says where its password is.
 
 MLflow's start page gets defaults of ours, without assistant and advertisement; Prefect's a line above its login.
 """
