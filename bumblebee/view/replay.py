@@ -1,4 +1,4 @@
-"""What can be shown, as one file that needs no server: a page with a 3D replay, or a film."""
+"""One file of a source that needs no server: a page with a 3D replay, or a film."""
 
 from collections.abc import Callable
 from pathlib import Path
