@@ -25,6 +25,8 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     diagnosis = turn.diagnosis
     blocks: list[Block] = [text(_arrived(turn))]
     blocks += [heading("Effects that the simulator lacked"), *_effects(results.sealed, diagnosis)]
+    undone = compensation_table(turn.compensation)
+    blocks += [heading("Undone at the joint, without training"), *undone] if undone else []
     blocks.append(heading("Error of the simulator before and after"))
     blocks += residual_chart(diagnosis["error"])
     held = plural(len(diagnosis["holdout"]), "rollout")
@@ -34,8 +36,6 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     under = noise_floor.summary(diagnosis["error"], [key for key, *_ in _MEASURES if key != "chi2"])
     blocks += [note(under)] if under else []
     blocks.append(text(_remains(diagnosis)))
-    undone = compensation_table(turn.compensation)
-    blocks += [heading("Undone at the joint, without training"), *undone] if undone else []
     blocks += [heading("Delta actions"), *_deltas(turn.deltas)]
     return Section(f"round-{turn.n}", f"Round {turn.n} with the robot", tuple(blocks))
 
