@@ -8,7 +8,6 @@ made from the true effects, as a diagnosis without an error would name them; no 
 """
 
 import argparse
-import io
 from functools import partial
 from pathlib import Path
 
@@ -23,12 +22,12 @@ from bumblebee.deploy.stand_in_effects import declared_g1, entry
 from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.deploy.undeclared.faults import peaks
 from bumblebee.deploy.undeclared.kinds import KINDS, Place
-from bumblebee.io.write import write_file
 from bumblebee.last_line import guarded
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
+from bumblebee.report.film_file import write_film
 from bumblebee.report.filmstrip import states
 from bumblebee.report.render import render_frames
 from bumblebee.robot.model import build_spec
@@ -122,21 +121,11 @@ def film(rollouts: list[Rollout], words: list[str]) -> list[Image.Image]:
 
 def save(path: Path, pictures: list[Image.Image]) -> None:
     """Write an animated picture that plays at real speed, over and over, in at most 1.5 MB."""
+    frames = np.stack([np.asarray(picture) for picture in pictures])
     for quality in (80, 65, 50, 35):
-        buffer = io.BytesIO()
-        pictures[0].save(
-            buffer,
-            "webp",
-            save_all=True,
-            append_images=pictures[1:],
-            duration=round(1000 / _FPS),
-            loop=0,
-            quality=quality,
-        )
-        if buffer.tell() <= _LARGEST:
+        if (size := write_film(path, frames, _FPS, quality)) <= _LARGEST:
             break
-    write_file(path, buffer.getvalue())
-    print(f"written: {path}, {len(pictures)} frames, {buffer.tell() / 1e6:.2f} MB")
+    print(f"written: {path}, {len(pictures)} frames, {size / 1e6:.2f} MB")
 
 
 if __name__ == "__main__":

@@ -86,7 +86,7 @@ def rendering() -> Said:
 
     spec = build_spec()
     frames, how = render_frames(spec.compile() and spec.to_xml(), spec.compile().key_qpos.astype(np.float64), 32, 32)
-    remedy = "films are drawn as stick figures; on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
+    remedy = "films are painted, and slower; Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
     yield frames is not None, False, f"off-screen OpenGL, {how}" if frames is not None else f"OpenGL; {remedy}"
 
 

@@ -147,7 +147,9 @@ def retarget(
 def play(
     path: Where,
     motion: Annotated[str, typer.Option("--motion", help="Which, where there are several: its name.")] = "",
-    out: Annotated[Path | None, typer.Option("--out", help="film.gif, or film.png for a filmstrip.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="film.gif, .webp or .mp4, or film.png for a filmstrip.")
+    ] = None,
     seconds: Annotated[tuple[float, float], typer.Option("--seconds", help="From and to: the part that is shown.")] = (
         0.0,
         10.0,
@@ -254,8 +256,10 @@ def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
 
 def _claim_picture(out: Path, path: Path) -> None:
     from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
+    from bumblebee.report.film_file import require_film
 
     refuse_overlap(out, [path])
+    require_film(out, (".png",))
     refuse_existing(out)
     try_output(out)
 

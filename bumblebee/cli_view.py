@@ -37,7 +37,9 @@ def view(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md."),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Write replay.html, for no server, instead.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Instead write replay.html, or film.gif, .webp or .mp4.")
+    ] = None,
     name: Annotated[str, typer.Option("--name", help="Which of several the replay shows: its name.")] = "",
     seconds: Annotated[float, typer.Option("--seconds", min=0.1, max=120, help="Length of the replay at most.")] = 10.0,
     port: Port = PORT,
@@ -54,22 +56,21 @@ def view(
         if out is None:
             _play(entries, title, port, meshes, ticks, make)
             return
-        from bumblebee.io.write import write_file
         from bumblebee.report.looks import meshes_of_user
-        from bumblebee.view.replay import record
+        from bumblebee.view.replay import record, write_take
         from bumblebee.view.sources import named
 
         entry = named(entries, name, path)
-        text = record(entry.make(), entry.name, meshes_of_user(meshes), seconds, make)
-    write_file(out, text)
-    print(f"written: {out}, {len(text) / 1e6:.1f} MB; it opens in a browser without a server")
+        take = record(entry.make(), entry.name, meshes_of_user(meshes), seconds, make)
+    size = write_take(out, take)
+    print(f"written: {out}, {size / 1e6:.1f} MB; it opens without a server")
 
 
 def _claim(out: Path, inputs: list[Path]) -> None:
     from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
+    from bumblebee.report.film_file import require_film
 
-    if out.suffix != ".html":
-        raise BadInput(out, "a name that ends in .html", repr(out.suffix)[:20])
+    require_film(out, (".html",))
     refuse_overlap(out, inputs)
     refuse_existing(out)
     try_output(out)

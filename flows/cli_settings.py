@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
 from importlib import import_module
+from itertools import accumulate
 from typing import Annotated, Any, get_args
 
 import typer
@@ -27,7 +28,7 @@ def settings(
             raise BadInput(section, f"a section among {', '.join(SECTIONS)}", "none of them", nearest(first, SECTIONS))
     rows = [row for name in SECTIONS for row in keys(name, _class(name)) if _under(row[0], section)]
     if not rows:
-        known = [row[0] for row in keys(first, _class(first))]
+        known = [part for row in keys(first, _class(first)) for part in accumulate(row[0].split("."), "{}.{}".format)]
         raise BadInput(section, f"a key of `{first}`", "an unknown one", nearest(section, known))
     for key, default, allowed, meaning in rows:
         print(f"{key}: {default}   # {allowed}\n    {meaning}")

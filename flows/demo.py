@@ -9,11 +9,11 @@ from pathlib import Path
 
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
-from flows import login, terminal
+from flows import terminal
 from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
-from flows.ending import registry, serve, shown, summarise
-from flows.environment import SERVERS, environment
+from flows.ending import login_of, registry, serve, shown, summarise
+from flows.environment import environment
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
@@ -146,8 +146,7 @@ def announce(folder: Path, addresses: Addresses) -> None:
     print(f"workspace  {shown(folder)}")
     print(f"Prefect    {addresses.prefect}   the stages as they run, and the gates")
     print(f"MLflow     {registry(addresses.mlflow)}   the registered policies, and every run's numbers")
-    print(f"login      user {login.USER}, password in {shown(folder / SERVERS / login.NAME)} (only you can read it);")
-    print("           Prefect's page wants the whole line of that file")
+    print(f"login      {login_of(folder)}")
     print(f"open them again with: {serve(folder)}", flush=True)
 
 

@@ -8,7 +8,8 @@ import shlex
 from pathlib import Path
 
 from bumblebee.measured.gate_words import program
-from flows import servers
+from flows import login, servers
+from flows.environment import SERVERS
 from flows.first_look import MODELS
 from tasks import paths
 
@@ -32,7 +33,7 @@ def finding(page: str) -> str:
 def lines(folder: Path) -> list[tuple[str, str]]:
     """(what, link or command that works as printed here) of a finished workspace."""
     told = [("report", (folder / paths.REPORT).resolve().as_uri()), ("policies", models_page(folder))]
-    told.append(("watch", command("view", shown(folder / paths.GENERALIST))))
+    told += [("login", login_of(folder)), ("watch", command("view", shown(folder / paths.GENERALIST)))]
     models = json.loads((folder / paths.PUBLISHED).read_text())["models"]
     asked = [name for name, facts in models.items() if facts.get("proposal")]
     told += [("asked", command("gate", "show", name, "--workspace", shown(folder))) for name in asked]
@@ -46,6 +47,12 @@ def models_page(folder: Path) -> str:
     with servers.listener() as free:
         port = free.getsockname()[1]
     return f"{registry(f'http://{servers.HOST}:{port}')}   while this runs: {serve(folder, '--mlflow-port', str(port))}"
+
+
+def login_of(folder: Path) -> str:
+    """Which user both servers' pages ask for, and where the password is."""
+    place = shown(folder / SERVERS / login.NAME)
+    return f"user {login.USER}, password behind the colon in {place}; Prefect's page takes that whole line"
 
 
 def registry(mlflow: str) -> str:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from flows import login
 from flows.environment import SERVERS
-from flows.first_look import first_look
+from flows.first_look import LoginHint, first_look
 from flows.guard import Guard
 from tasks import registry
 from tasks.lab import read_lab
@@ -52,7 +52,8 @@ def main(argv: list[str] | None = None) -> int:
     if options.door is not None:
         os.environ["MLFLOW_SERVER_ALLOWED_HOSTS"] = "*"  # the guard and the door before it judge them
     try:
-        app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(options.workspace)
+        prefect = options.server == "prefect"
+        app = LoginHint(prefect_app(port, password)) if prefect else mlflow_app(options.workspace)
     except BadInput as error:
         print(error, file=sys.stderr)  # its last line is what the keeper tells
         return EXIT_BAD_INPUT

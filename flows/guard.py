@@ -70,7 +70,8 @@ class Guard:
             nonce = parse_qs(scope["query_string"].decode("latin-1")).get("nonce", [""])[0]
             await reply(send, 200, proof(self.password, nonce))
         elif self.ask and not allowed(headers, self.password):
-            await refuse(scope, receive, send, 401, f"user {login.USER}, password in .servers/{login.NAME}")
+            where = f"behind the colon in the file .servers/{login.NAME} of the workspace"
+            await refuse(scope, receive, send, 401, f"user {login.USER}, password {where}")
         else:
             await self.app(scope, receive, with_headers(send))
 
@@ -125,11 +126,11 @@ async def refuse(scope: Message, receive: Receive, send: Send, status: int, reas
 
 
 async def reply(send: Send, status: int, text: str) -> None:
-    """A short answer in plain text, or in JSON."""
+    """A short answer in plain text, or in JSON; of a 401 the text is the realm too, which some browsers show."""
     kind = b"application/json" if text.startswith("{") else b"text/plain; charset=utf-8"
     headers = {**HEADERS, b"content-type": kind, b"cache-control": b"no-store"}
     if status == 401:
-        headers[b"www-authenticate"] = b'Basic realm="bumblebee", charset="UTF-8"'
+        headers[b"www-authenticate"] = f'Basic realm="{text}", charset="UTF-8"'.encode()
     await send({"type": "http.response.start", "status": status, "headers": list(headers.items())})
     await send({"type": "http.response.body", "body": text.encode() + b"\n"})
 

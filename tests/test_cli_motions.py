@@ -115,8 +115,8 @@ def test_play_makes_a_film_and_a_filmstrip_with_and_without_opengl(folder, tmp_p
     with Image.open(tmp_path / "strip.png") as strip:
         assert strip.size == (4 * 320, 300)
         colours = {colour for _, colour in strip.convert("RGB").getcolors(1 << 20)}
-    assert len(colours) == 4  # greys, or white, ground, left and right
-    assert ("drawn, as nothing can be rendered here (egl: no device)" in capsys.readouterr().out) is not renders
+    assert len(colours) == 4 if renders else len(colours) > 20  # greys, or the robot in its colours
+    assert ("painted, as nothing renders here (egl: no device)" in capsys.readouterr().out) is not renders
 
 
 def test_play_asks_for_what_it_needs(folder, tmp_path, capsys, monkeypatch):
@@ -132,7 +132,7 @@ def test_play_asks_for_what_it_needs(folder, tmp_path, capsys, monkeypatch):
             (folder / "bad.pkl", "--out", tmp_path / "a.gif"),
             "expected a motion of the robot, came none that can be used",
         ),
-        ((folder / "walk.pkl", "--out", tmp_path / "a.mp4"), "a name that ends in .gif or .png"),
+        ((folder / "walk.pkl", "--out", tmp_path / "a.avi"), "a name that ends in .gif, .webp, .mp4 or .png"),
         (
             (folder / "walk.pkl", "--out", tmp_path / "a.gif", "--seconds", 9, 10),
             "of the motion's 0 to 1.2 s, came 9 to 10",

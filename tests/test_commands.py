@@ -83,6 +83,17 @@ def test_a_key_of_a_section_has_that_sections_default(capsys):
     assert "Did you mean base?" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("asked", "near"),
+    [("base.pp", "base.ppo"), ("base.ppo.epoch", "base.ppo.epochs"), ("gate.modes", "gate.mode"), ("gat", "gate")],
+)
+def test_a_key_that_is_not_there_names_the_near_one_be_it_a_part_or_a_key(asked, near, capsys):
+    assert run("settings", asked) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and said.endswith(f"Did you mean {near}?\n")
+    assert run("settings", near) == 0
+
+
 def test_the_doctor_says_a_lack_with_a_remedy(capsys, monkeypatch):
     doctor = import_module("bumblebee.cli_doctor")
     monkeypatch.setattr(doctor.shutil, "which", lambda name: None)

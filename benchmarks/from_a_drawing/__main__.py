@@ -58,7 +58,7 @@ def _run(seed: int, robot: str, policy: Path | None) -> dict[str, Any]:
     errors = {
         h: [document["error"][k][h]["joint_pos_rmse"]["value"] for k in ("before", "after", "floor")] for h in HORIZONS
     }
-    named = [[e["effect"], *e["where"], round(e["explains"], 4)] for e in document["effects"]]
+    named = [[e["effect"], *e["where"], round(e["explains"] or 0.0, 4)] for e in document["effects"]]
     seconds = round(monotonic() - began, 1)
     return {"seed": seed, **case.row, "errors": errors, "sizes": sizes, "named": named, "seconds": seconds}
 

@@ -135,7 +135,8 @@ def film(motion: Clip, out: str | Path, *, start: float = 0.0, end: float = 10.0
 
     Args:
         motion: the motion.
-        out: a file that ends in `.gif` (film) or `.png` (filmstrip); one that is there is replaced.
+        out: a film (`.gif`, `.webp`, or `.mp4` where ffmpeg is installed) or a filmstrip (`.png`); one that is there
+            is replaced.
         start: where it begins [s].
         end: where it ends at the latest [s].
 

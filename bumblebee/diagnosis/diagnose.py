@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from bumblebee.diagnosis.report import (
     effect_entries,
     law_notes,
     loss_entries,
+    shares_left_out,
     surface_notes,
     unseen_notes,
 )
@@ -92,7 +94,8 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     material = gather(session, config, rng, say)
     found = _found(material, config, rng, say)
     say(f"prediction error before and after {len(found.last.fit.chosen)} effects")
-    entries = effect_entries(found.search, found.last, found.holdout, found.beyond)
+    shares = partial(shares_left_out, material.session, config.report_windows)
+    entries = effect_entries(found.search, found.last, found.holdout, found.beyond, shares)
     rounded, steps = _steps_of_encoders(material.session, found)
     lost, losses = loss_entries(found.search.loss)
     effects, steps, notes = standing(found.judging, found.last.fit.effects, steps)

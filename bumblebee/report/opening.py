@@ -17,7 +17,7 @@ from bumblebee.report.wording import percent, plural
 
 _BRACKETS = "Motions followed to the end. Square brackets: 95 % interval."
 _NOTHING = (
-    "Explains 0 %: the tests hold the effect for real, but on the held-out rollouts the others alone predict as well. "
+    "0 % lost without it: the tests hold the effect for real, but the others predict the held-out rollouts as well. "
     "It may matter in other motions."
 )
 _ON_ROBOT, _ON_DECLARED = ("on the robot", "on the declared model")
@@ -46,7 +46,7 @@ def opening_lines(results: LoopResults) -> list[str]:
         return lines
     lines += [paid] if (paid := price(results, turn)) else []
     for *row, share in effect_rows(results, turn):
-        lines.append(" -> ".join(row) + f" (explains {share})")
+        lines.append(" -> ".join(row) + f" (lost without it: {share})")
     lines += [*_remarks(turn), error_line(turn)]
     for step in _steps(results, turn):
         told = [f"{percent(rate)} {where}" for rate, where in _rates(results, step) if rate is not None]
@@ -139,9 +139,9 @@ def _changed(results: LoopResults, turn: RoundResults) -> list[str]:
 def _effects(results: LoopResults, turn: RoundResults) -> list[Block]:
     rows = _rows(results, turn)
     if results.sealed is None:
-        header: tuple[str, ...] = ("found, not in the declared model", "explains")
+        header: tuple[str, ...] = ("found, not in the declared model", "lost without it")
     else:
-        header = ("undeclared", "found", "explains")
+        header = ("undeclared", "found", "lost without it")
     shown = [pairs(header, rows, "effects")] if rows else []
     nothing = [] if rows or results.sealed is not None else [text("No effect passed the tests: the model stands.")]
     return [*shown, *nothing, *(note(line) for line in _remarks(turn)), text(error_line(turn))]

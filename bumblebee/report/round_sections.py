@@ -25,6 +25,8 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     diagnosis = turn.diagnosis
     blocks: list[Block] = [text(_arrived(turn))]
     blocks += [heading("Effects that the simulator lacked"), *_effects(results.sealed, diagnosis)]
+    undone = compensation_table(turn.compensation)
+    blocks += [heading("Undone at the joint, without training"), *undone] if undone else []
     blocks.append(heading("Error of the simulator before and after"))
     blocks += residual_chart(diagnosis["error"])
     held = plural(len(diagnosis["holdout"]), "rollout")
@@ -34,8 +36,6 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     under = noise_floor.summary(diagnosis["error"], [key for key, *_ in _MEASURES if key != "chi2"])
     blocks += [note(under)] if under else []
     blocks.append(text(_remains(diagnosis)))
-    undone = compensation_table(turn.compensation)
-    blocks += [heading("Undone at the joint, without training"), *undone] if undone else []
     blocks += [heading("Delta actions"), *_deltas(turn.deltas)]
     return Section(f"round-{turn.n}", f"Round {turn.n} with the robot", tuple(blocks))
 
@@ -59,14 +59,17 @@ def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
     if sealed is None:
         rows = [(*effect_line(effect), _share(effect)) for effect in found]
         nothing = [] if rows else [text("No effect passed the tests: the declared model stands.")]
-        return [*nothing, table(("effect", "estimate [95 %]", "declared", "explains"), rows, "", "effects found")]
+        return [
+            *nothing,
+            table(("effect", "estimate [95 %]", "declared", "lost without it"), rows, "", "effects found"),
+        ]
     compared = [_truth_row(pair) for pair in match(sealed["effects"], found)]
     if not compared:
         return [text("Nothing was sealed and nothing was found: no false alarm.")]
-    header = ("sealed in the stand-in", "sealed value", "found", "estimate [95 %]", "explains")
+    header = ("sealed in the stand-in", "sealed value", "found", "estimate [95 %]", "lost without it")
     caption = (
-        "Explains: share of the held-out excess error that the effect removes; the shares of effects that act together "
-        "can add up to more than 100 %. The diagnosis cannot read the seal."
+        "Lost without it: share of what all effects together take off the held-out error that comes back when this one "
+        "is left out; shares need not sum to 100 %. The diagnosis cannot read the seal."
     )
     return [table(header, compared, caption, "effects sealed and found")]
 

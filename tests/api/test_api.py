@@ -28,7 +28,7 @@ FILES = {"policy.pt", "policy.onnx", "contract.json", "card.json", "README.md", 
 
 @pytest.fixture(autouse=True)
 def quick(tmp_path, monkeypatch):
-    """Work in a folder of its own; embedded motions are made once, films drawn as stick figures."""
+    """Work in a folder of its own; embedded motions are made once, films painted."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("bumblebee.report.playback.render_frames", lambda *rest: (None, "not here"))
     monkeypatch.setattr("bumblebee.motion.embedded.make_library", lambda config: STAND[: config.limit])

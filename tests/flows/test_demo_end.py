@@ -42,7 +42,8 @@ def test_the_last_screen_is_the_finding_and_a_line_each_to_go_on(
 ) -> None:
     first, *others = screen(workspace, capsys)
     assert first == FINDING.replace("\u00a0", " ")
-    assert [line.split()[0] for line in others] == ["report", "policies", "watch", "asked", "next"]
+    assert [line.split()[0] for line in others] == ["report", "policies", "login", "watch", "asked", "next"]
+    assert "user bumblebee" in others[2] and "runs/my lab/.servers/login" in others[2]
     report = others[0].split()[1]
     assert report == (Path.cwd() / workspace / paths.REPORT).as_uri() and "%20" in report
 

@@ -11,6 +11,7 @@ import pytest
 from bumblebee.errors import BadInput
 from flows import front, guard, login
 from flows.environment import environment, without_login
+from flows.first_look import LoginHint
 
 HOST = ("host", "127.0.0.1:4321")
 OWN = ("origin", "http://127.0.0.1:4321")
@@ -52,6 +53,35 @@ def test_only_the_login_opens_the_door_whatever_the_method():
         for headers in ((HOST,), (HOST, wrong), (HOST, LOGIN, LOGIN), (HOST, ("authorization", "Basic"))):
             status, answer, _ = ask(*headers, method=method)
             assert status == 401 and answer[b"www-authenticate"].startswith(b"Basic")
+
+
+def test_who_is_asked_for_the_login_is_told_user_and_file_in_the_answer_and_in_its_realm():
+    _, headers, body = ask(HOST)
+    said = body.decode().strip()
+    assert "user bumblebee" in said and ".servers/login" in said
+    assert f'realm="{said}"'.encode() in headers[b"www-authenticate"]
+
+
+def test_prefects_pages_say_above_their_logins_field_what_to_give_and_everything_else_stays():
+    page, sent = b"<html><head></head><body>", []
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        packed = any(name == b"accept-encoding" for name, _ in scope["headers"])
+        content = b"packed" if packed else page
+        headers = [(b"content-length", b"%d" % len(content)), (b"x-kept", b"1")]
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        await send({"type": "http.response.body", "body": content})
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    for kind in (b"text/html,*/*", b"*/*"):
+        headers = [(b"accept", kind), (b"accept-encoding", b"gzip")]
+        asyncio.run(LoginHint(app)({"type": "http", "headers": headers}, None, send))
+    html, other = sent[1]["body"].decode(), sent[3]
+    assert "whole line of the file .servers/login" in html.partition("</head>")[0] and html.endswith("<body>")
+    assert sent[0]["headers"] == [(b"x-kept", b"1")]  # its length is another
+    assert other["body"] == b"packed" and len(sent[2]["headers"]) == 2
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "127.0.0.1:1@evil", "", "10.0.0.1:4321"])

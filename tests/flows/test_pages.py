@@ -256,7 +256,12 @@ def look(page: "Page", name: str) -> None:
 def test_a_person_logs_in_watches_a_run_and_answers_its_gate_on_prefects_page(served: Served, page: "Page"):
     run = served.start()
     page.goto(f"{served.addresses.prefect}/v2/runs/flow-run/{run['id']}")
-    page.get_by_placeholder("admin:pass").fill(login.pair(served.password))
+    shown = page.get_by_placeholder("admin:pass")
+    shown.wait_for()
+    hint = "getComputedStyle(document.querySelector('form:has([placeholder])'), '::before').content"
+    assert ".servers/login" in page.evaluate(hint)
+    look(page, "prefect-login")
+    shown.fill(login.pair(served.password))
     page.get_by_role("button", name="Login").click()
     page.get_by_role("tab", name="Task Runs").wait_for()
     served.until(run["id"], "Suspended")

@@ -215,6 +215,43 @@ def test_a_replay_plays_at_a_chosen_speed_pauses_and_scrubs_with_the_network_cut
     context.close()
 
 
+CONTRAST = """(e) => {
+    const light = (colour) => { const c = colour.match(/[\\d.]+/g).slice(0, 3)
+        .map(Number).map((v) => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2] + 0.05; };
+    const clear = (colour) => /, 0\\)$/.test(colour);
+    let under = e; while (under && clear(getComputedStyle(under).backgroundColor)) under = under.parentElement;
+    const pair = [light(getComputedStyle(e).color), under ? light(getComputedStyle(under).backgroundColor) : 1.05];
+    return Math.max(...pair) / Math.min(...pair);
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1440])
+def test_a_replay_fits_the_screen_can_be_read_and_is_driven_with_the_network_cut(
+    browser: Any, file: Path, width: int, scheme: str
+) -> None:
+    context = browser.new_context(offline=True, viewport={"width": width, "height": 900}, color_scheme=scheme)
+    shown = context.new_page()
+    shown.goto(file.as_uri())
+    shown.locator("figure.replay[data-drawn]").wait_for(timeout=60_000)
+    assert shown.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    for part_of_it in ("canvas", ".play", "input[type=range]", "output", ".speed"):
+        box = shown.locator(part_of_it).bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= width, part_of_it
+    for words in ("h1", "output", ".play"):
+        assert shown.locator(words).first.evaluate(CONTRAST) > 4.5, words
+    shown.locator(".play").click()
+    slider, pictures = shown.locator("input[type=range]"), []
+    for frame in ("5", "45"):
+        slider.fill(frame)
+        pictures.append(shown.locator("canvas").screenshot())
+    assert pictures[0] != pictures[1]
+    shown.locator(".play").click()
+    pytest.importorskip("playwright.sync_api").expect(slider).not_to_have_value("45")
+    context.close()
+
+
 def test_without_scripts_the_picture_is_shown_and_no_dead_button(browser: Any, file: Path) -> None:
     context = browser.new_context(java_script_enabled=False)
     shown = context.new_page()

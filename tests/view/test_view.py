@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from bumblebee.api.policies import load_policy
 from bumblebee.cli import run
@@ -158,6 +159,20 @@ def test_a_replay_is_one_small_file_that_asks_for_nothing(tmp_path: Path, clip, 
         run(order)
     with pytest.raises(BadInput, match="expected something called 'jump'"):
         run([*order[:3], str(tmp_path / "other.html"), "--name", "jump"])
+
+
+@pytest.mark.parametrize("name", ["film.gif", "film.webp"])
+def test_a_film_of_what_is_shown_plays_at_real_speed_and_moves(tmp_path: Path, clip, name: str):
+    path, out = write_motion(tmp_path / "motions", clip, "asap"), tmp_path / name
+    assert run(["view", str(path), "--out", str(out), "--seconds", "0.5"]) == 0
+    with Image.open(out) as film:
+        shown = []
+        for number in range(film.n_frames):
+            film.seek(number)
+            picture = np.asarray(film.convert("RGB")).astype(int)  # read first: only then a WebP knows its duration
+            shown.append((film.info["duration"], picture))
+    assert len(shown) == 7 and sum(length for length, _ in shown) == pytest.approx(7 * 80, abs=60)
+    assert np.abs(shown[0][1] - shown[-1][1]).max() > 100 and (shown[0][1] < 100).any()
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from bumblebee.diagnosis.report.html import (
     table,
     warning,
 )
+from bumblebee.diagnosis.report.left_out import shares_left_out
 from bumblebee.diagnosis.report.notes import ALONE, nothing_seen, told_horizon, unseen_notes
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.prediction_error import (
@@ -58,6 +59,7 @@ __all__ = [
     "probability",
     "render_report",
     "shade",
+    "shares_left_out",
     "summary",
     "surface_notes",
     "table",

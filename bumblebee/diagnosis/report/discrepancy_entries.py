@@ -22,7 +22,7 @@ _NOWHERE = "no single joint has a significant residual torque, but the reduced c
 
 
 def discovered_entry(
-    c: Formula, values: np.ndarray, half: np.ndarray, explains: float, z: float, kind: str
+    c: Formula, values: np.ndarray, half: np.ndarray, explains: float | None, z: float, kind: str
 ) -> dict[str, Any]:
     """The contract's entry of a form with `values` (P,) and half-widths (P,) of its intervals.
 

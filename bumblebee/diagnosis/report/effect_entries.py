@@ -1,6 +1,7 @@
 """The contract's list of effects: name, place, sizes with intervals, share of the error, evidence."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from bumblebee.diagnosis.comparison import Holdout, wald
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry
-from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection import Loss, Refined, Search, alike, contact_share, rivals
 from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
 from bumblebee.diagnosis.thresholds.report import Effects
@@ -20,7 +20,13 @@ from bumblebee.sim.effects import CATALOGUE, Effect, is_native
 SURFACE = "surface_contact"
 
 
-def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None) -> list[dict[str, Any]]:
+Shares = Callable[[Sequence[Effect], Sequence[Sequence[Effect]]], Sequence[float | None]]
+"""All effects, and these without one entry's each -> shares, as `shares_left_out` gives them."""
+
+
+def effect_entries(
+    found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None, shares_of: Shares
+) -> list[dict[str, Any]]:
     """The list of `diagnosis.json`, most explaining first.
 
     Dry friction that changes with direction or speed is one entry with the level that it sits on, `frictionloss`.
@@ -30,7 +36,7 @@ def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Disco
         return []
     levels = _levels(last.fit, last.problem.thresholds.report.effects)
     groups = [[c, *([levels[c]] if c in levels else [])] for c in chosen if c not in levels.values()]
-    shares = _explained(holdout.problem or last.problem, last.fit, groups)
+    shares = list(shares_of(last.fit.effects, [reduce(without, group, last.fit.effects) for group in groups]))
     for k, (c, *_) in enumerate(groups):
         if c.effect in JUDGED_ALONE:
             shares[k] = contact_share(last.problem, last.fit, c, holdout.problem)
@@ -42,14 +48,14 @@ def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Disco
             i, kind = chosen.index(c), beyond.kinds[c.where] if beyond else ""
             values, half = last.fit.of(c), last.half[last.fit.slices[i]]
             z = wald(last.problem, last.fit, last.weights, i)
-            entries.append(discovered_entry(c, values, half, float(share), z, kind))
+            entries.append(discovered_entry(c, values, half, share, z, kind))
         else:
-            entries.append(_entry(found, last, group, float(share), [classes[each] for each in group]))
-    return sorted(entries, key=lambda e: -e["explains"])
+            entries.append(_entry(found, last, group, share, [classes[each] for each in group]))
+    return sorted(entries, key=lambda e: -(e["explains"] or 0.0))
 
 
 def _entry(
-    found: Search, last: Refined, group: Sequence[Candidate], share: float, classes: Sequence[list[Candidate]]
+    found: Search, last: Refined, group: Sequence[Candidate], share: float | None, classes: Sequence[list[Candidate]]
 ) -> dict[str, Any]:
     """The entry of a group's first, with the parameters of all."""
     first, step = group[0], {s.candidate: s for s in found.steps}[group[0]]
@@ -146,20 +152,6 @@ def law_notes(last: Refined) -> list[str]:
             f"{slopes[1]:.3g} {unit}. To tell them apart: move the joint to and fro by more than the width"
         )
     return notes
-
-
-def _explained(problem: Problem, fit: Fit, groups: Sequence[Sequence[Candidate]]) -> np.ndarray:
-    """Share of the excess of chi-square over its best value that comes back when a group alone is taken out."""
-    sets = [fit.effects]
-    for group in groups:
-        kept = fit.effects
-        for c in group:
-            kept = without(kept, c)
-        sets.append(kept)
-    left = problem.residual([*sets, []]) - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
-    power = (left**2).mean(axis=(1, 2))
-    excess = max(power[-1] - power[0], 1e-12)
-    return np.clip((power[1:-1] - power[0]) / excess, 0.0, 1.0)
 
 
 def loss_entries(loss: Loss | None) -> tuple[list[dict[str, Any]], list[Effect]]:

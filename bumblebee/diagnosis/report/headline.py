@@ -7,6 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.report.gain_by_horizon import gain_of, leaves_floor, whole_model
 from bumblebee.diagnosis.report.html import number
+from bumblebee.diagnosis.report.left_out import lost_without
 from bumblebee.diagnosis.report.what_matters import BESIDE, CARRY, LEFT, WIDE
 from bumblebee.diagnosis.thresholds.report import Matters, ReportThresholds
 
@@ -147,7 +148,9 @@ def _readable(trust: Sequence[Mapping[str, Any]], rules: ReportThresholds) -> st
     fold = f"{rules.matters.wide:g}-fold"
     why = [f"{wide} have intervals wider than {fold} or with the declared value in them"] if wide else []
     why += [f"{alike} look like another effect"] if alike else []
-    return f"{text}; take the other {len(trust) - len(known)} only together{_in_brackets(why)}"
+    others = len(trust) - len(known)
+    how = f"the other {others} only together" if others > 1 else "the other one only with the rest"
+    return f"{text}; take {how}{_in_brackets(why)}"
 
 
 def _in_brackets(texts: Sequence[str]) -> str:
@@ -203,7 +206,7 @@ def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
 
 def _shown(effect: Mapping[str, Any]) -> str:
     sizes = [x for p in effect["parameters"].values() for x in (p["value"], *(p["ci95"] or ()), p["nominal"])]
-    return f"{100 * effect['explains']:.0f} " + " ".join("-" if x is None else f"{x:.4g}" for x in sizes)
+    return f"{lost_without(effect)} " + " ".join("-" if x is None else f"{x:.4g}" for x in sizes)
 
 
 def _listed(names: Sequence[str], most: int) -> str:

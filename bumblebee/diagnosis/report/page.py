@@ -18,6 +18,7 @@ from bumblebee.diagnosis.report.html import (
     table,
     warning,
 )
+from bumblebee.diagnosis.report.left_out import lost_without, shares_words
 from bumblebee.diagnosis.report.left_table import what_is_left_table
 from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
@@ -94,19 +95,17 @@ def _effects(document: dict[str, Any], rules: ReportThresholds) -> str:
     titled, rows = bool(document.get("summary")), []
     for title, effects in groups:
         rows += [*([[escape(title)]] if titled else []), *(_effect(e, rules.listing) for e in effects)]
-    head = ["effect", "explains", "value [95 % interval]", "declared", "p", "not distinguishable from"]
-    text = (
-        "<p class='note'>explains: share of the excess chi-square over the best fit that returns when this effect "
-        "alone is removed. p: see diagnosis.json for the test.</p>"
-    )
+    head = ["effect", "lost without it", "value [95 % interval]", "declared", "p", "not distinguishable from"]
+    text = f"<p class='note'>{escape(shares_words(document))} p: see diagnosis.json for the test.</p>"
     asked = experiments(document["effects"])
     told = f"<h3>To distinguish what is alike</h3>{items(asked)}" if asked else ""
     return table(head, rows, (4,)) + text + told
 
 
 def _effect(e: dict[str, Any], rule: Listing) -> list[str]:
-    place, share = escape(", ".join(e["where"]) or "whole robot"), 100 * e["explains"]
-    bar = f"<span class='share'><span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %</span>"
+    place, share = escape(", ".join(e["where"]) or "whole robot"), lost_without(e)
+    wide = 4.0 * (e["explains"] or 0.0)
+    bar = f"<span class='share'><span class='bar' style='width:{wide:.2f}rem'></span>{share}</span>"
     values, declared = _values(e, rule)
     wide = "<br><span class='note'>size uncertain</span>" if e.get("wide") else ""
     name = f"<b>{escape(e['effect'])}</b><br><span class='place'>{place}</span>"

@@ -7,6 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import short_term
 from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
+from bumblebee.diagnosis.report.left_out import lost_without, shares_words
 from bumblebee.diagnosis.report.notes import nothing_seen, what_is_left, worse_horizons
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, rows
 from bumblebee.diagnosis.thresholds.report import Listing, ReportThresholds, Verdicts
@@ -38,6 +39,7 @@ def _grouped(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
     for title, effects in effect_groups(document, rules):
         lines.append(f"{title[:1].lower()}{title[1:]}:")
         lines += [line for e in effects for line in _effect(e, rules.listing)]
+    lines += [shares_words(document)] if lines else []
     asked = experiments(document["effects"])
     if asked:
         lines += ["to distinguish what is alike:", *(f"  {text}" for text in asked)]
@@ -58,7 +60,7 @@ def _effect(effect: dict[str, Any], rule: Listing) -> list[str]:
         declared = "" if p["nominal"] is None else f" (declared {p['nominal']:.4g})"
         lines.append(
             f"  {effect['effect']:<18} {place:<28} {name} = {p['value']:.4g}{between}{unit}{declared},"
-            f" explains {100 * effect['explains']:.0f} %{', size uncertain' if effect.get('wide') else ''}"
+            f" lost without it: {lost_without(effect)}{', size uncertain' if effect.get('wide') else ''}"
         )
     if effect["equivalent"]:
         some = effect["equivalent"][: rule.equivalent]

@@ -119,7 +119,7 @@ def trust(effects: Sequence[Mapping[str, Any]], rule: Matters) -> list[dict[str,
     for effect in effects:
         fold = _narrowest(effect)
         wide = fold is None or fold > rule.wide
-        group = CARRY if effect["explains"] >= rule.carries else WIDE if wide else BESIDE
+        group = CARRY if (effect["explains"] or 0.0) >= rule.carries else WIDE if wide else BESIDE
         told = {"effect": effect["effect"], "where": effect["where"], "group": group}
         out.append(told | {"fold": fold, "wide": wide, "alike": bool(effect["equivalent"])})
     return out

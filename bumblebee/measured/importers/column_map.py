@@ -1,12 +1,15 @@
 """The map from the contract's columns to a file's own names, joints, units and clock."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from bumblebee.measured.rollout import WIDTHS
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-ANGLES = ("rad", "deg", "turn", "m", "normalised")
+ANGLE_FACTORS = {"rad": 1.0, "deg": math.pi / 180, "turn": 2 * math.pi, "m": 1.0, "normalised": 1.0}
+"""Unit that a map may state -> factor to the contract's, rad and m of slides."""
+ANGLES = tuple(ANGLE_FACTORS)
 CLOCKS = ("header", "log", "publish")
 LAYOUTS = ("unitree_hg",)
 LEFT_OUT = "_"

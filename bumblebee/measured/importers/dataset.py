@@ -22,6 +22,7 @@ from bumblebee.measured.importers.ros import import_rosbag
 from bumblebee.measured.importers.so101 import import_so101
 from bumblebee.measured.importers.source import open_source
 from bumblebee.measured.importers.sysid_npz import import_sysid
+from bumblebee.measured.importers.told_units import with_units_told
 from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.rollout import Rollout, write_rollout
 
@@ -70,6 +71,8 @@ def read_rollouts(
     if kind not in readers:
         raise BadInput(kind, f"one of {', '.join(KINDS)}", repr(kind))
     rollouts = _distinct(readers[kind]())
+    if kind in MAPPED:
+        rollouts = with_units_told(rollouts, mapped)
     return with_settings(with_conditions(rollouts, table) if table else rollouts, settings)
 
 

@@ -6,14 +6,13 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.measured.importers.clock import SHORTEST, require_clock, takes
-from bumblebee.measured.importers.column_map import LEFT_OUT, NAMED, ColumnMap
+from bumblebee.measured.importers.column_map import ANGLE_FACTORS, LEFT_OUT, NAMED, ColumnMap
 from bumblebee.measured.importers.drive import Stretch, stretches
 from bumblebee.measured.importers.source import NO_VELOCITY, differences, measured_rate
 from bumblebee.measured.rollout import COMMANDS, WIDTHS, Rollout
 
 _ANGULAR = ("joint_pos", "joint_vel", "joint_target", "target_vel")
 _NEEDED = ("joint_pos", *COMMANDS)
-_FACTORS = {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi, "m": 1.0, "normalised": 1.0}
 
 
 def rollouts_of(
@@ -102,9 +101,9 @@ def _turned(column: str, value: np.ndarray, chosen: ColumnMap) -> np.ndarray:
     """A column (T, width) in the contract's units and order."""
     with np.errstate(all="ignore"):  # what is too large is a finding of the checks, with its row
         if column in _ANGULAR and set(chosen.angle_unit) - {"rad", "m"}:
-            value = value * np.array([_FACTORS[unit] for unit in chosen.angle_unit])
+            value = value * np.array([ANGLE_FACTORS[unit] for unit in chosen.angle_unit])
         if column == "base_ang_vel":
-            value = value * _FACTORS[chosen.gyro_unit]
+            value = value * ANGLE_FACTORS[chosen.gyro_unit]
         value = value * np.array(chosen.scale.get(column, (1.0,))) + np.array(chosen.offset.get(column, (0.0,)))
     value[:, chosen.uncommanded(column)] = 0.0
     if column == "base_quat" and chosen.quat_order == "xyzw":
