@@ -164,7 +164,7 @@ def test_the_policys_process_answers_the_newest_question_and_ends_with_its_guard
     for tick in range(3):
         packets.send(ours, encode_question(Question(tick, tick, state()), CODEC))
     ours.shutdown(socket.SHUT_WR)
-    serve(Quick(), theirs, 3)  # type: ignore[arg-type]
+    serve(Quick(), Quick(), theirs, 3)  # type: ignore[arg-type]
     assert [decode_answer(message, 3).tick for message in packets.received(ours)] == [2]
 
 
