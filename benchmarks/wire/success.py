@@ -1,19 +1,23 @@
 """Success over the wire against the stepped simulation: same robot, policy and motions; pairs are compared.
 
-Stepped twice: without a latency, and with the one that the wire had as a delay of all commands. Over the wire twice:
-with the guard's rules, and with `tilt` alone, the rule by which the stepped simulation counts a fall. From one to the
-next it is latency, then the start from a gantry and what else a wire is, then the rules that damp before a fall.
+Stepped three times: as it is, with the wire's latency as a delay of all commands, and with that from the state in which
+the gantry let the robot go. Over the wire twice: with the guard's rules, and with `tilt` alone, the rule by which the
+stepped simulation counts a fall. So each way differs from the one before by one thing: latency, start, wire, rules.
 """
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pandas as pd
 
 from benchmarks.wire.common import clips, shipped
+from bumblebee import quaternions
+from bumblebee.deploy import episodes
 from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.sensors import SensorNoise
@@ -24,12 +28,17 @@ from bumblebee.evaluation.intervals import bootstrap_mean, mcnemar_test, sign_fl
 from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import joint_names
 from bumblebee.tracking.terminations import Stop
+from bumblebee.wire.align import aligned
 from bumblebee.wire.limits import Limits
+from bumblebee.wire.phases import Phase
+from bumblebee.wire.rehearsal import Rehearsal
 from bumblebee.wire.rollouts import latency
-from bumblebee.wire.stand_in import rehearsed
+from bumblebee.wire.stand_in import prepared, records_of, rehearsed
 
-WAYS = ("stepped", "delayed", "tilt alone", "wire")
+WAYS = ("stepped", "delayed", "let go", "tilt alone", "wire")
 PAIRS = (*pairwise(WAYS), ("stepped", "wire"), ("delayed", "wire"))
+Start = tuple[np.ndarray, np.ndarray]
+"""A robot's qpos (7 + J,) and qvel (6 + J,)."""
 TILT_ALONE = Limits(beyond=1.0, speed=100, power=100, far=100, stall=60, air=60)
 
 
@@ -44,10 +53,12 @@ def run(options: argparse.Namespace) -> None:
 
 def compared(policy: ExportedPolicy, motions: Sequence[Clip], sealed: Path | None, seed: int) -> pd.DataFrame:
     """A row for each motion on one robot: whether each way followed it to its end, and what ended it on the wire."""
-    effects, rows = read_sealed(sealed) if sealed else [], []
+    effects, rows, starts = read_sealed(sealed) if sealed else [], [], []
     for clip in motions:
-        done, records = rehearsed(policy, clip, effects, seed)
-        late, reason = latency(records), done.guard.reason
+        run = prepared(policy, clip, effects, seed)
+        records, start = followed(run)
+        starts.append(start)
+        late, reason = latency(records), run.guard.reason
         alone = reason  # the run is the same until a rule ends it
         if reason not in ("", "tilt"):
             alone = rehearsed(policy, clip, effects, seed, TILT_ALONE)[0].guard.reason
@@ -58,8 +69,32 @@ def compared(policy: ExportedPolicy, motions: Sequence[Clip], sealed: Path | Non
     table = pd.DataFrame(rows, columns=["motion", "wire", "rule", "tilt alone", "latency"])
     table.insert(0, "robot", sealed.stem if sealed else "declared")
     table["stepped"] = stepped(policy, motions, effects, seed, 0.0)
-    table["delayed"] = stepped(policy, motions, effects, seed, float(table["latency"].median()))
+    delay = float(table["latency"].median())
+    table["delayed"] = stepped(policy, motions, effects, seed, delay)
+    with patch.object(episodes, "start_states", partial(in_place, starts)):
+        table["let go"] = stepped(policy, motions, effects, seed, delay)
     return table
+
+
+def followed(run: Rehearsal) -> tuple[np.ndarray, Start]:
+    """A run's records, and the state in which the gantry let the robot go, or the last one."""
+    batch, entries, start = run.robot.robots.batch, [], None
+    for entry in run.entries():
+        entries.append(entry)
+        if start is None and entry.tick.phase >= Phase.RUN:
+            start = batch.bind("qpos")[0].copy(), batch.bind("qvel")[0].copy()
+    assert start is not None
+    return records_of(run, entries), start
+
+
+def in_place(starts: Sequence[Start], clips: Sequence[Clip], *rest: object) -> Start:
+    """Starts of all robots, moved in the plane to where the clips begin, heading as they do."""
+    qpos, qvel = (np.stack(part) for part in zip(*starts, strict=True))
+    for pos, vel, clip in zip(qpos, qvel, clips, strict=True):
+        at = aligned(pos[:3], pos[3:7], clip.root_pos[0].astype(float), clip.root_quat[0].astype(float))
+        pos[:3], pos[3:7] = at.seen(pos[:3], pos[3:7])
+        vel[:3] = quaternions.rotate(at.turn, vel[:3])
+    return qpos, qvel
 
 
 def stepped(

@@ -16,7 +16,7 @@ import pytest
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning.export import export_shipped
 from bumblebee.measured.rollout import read_rollout
-from bumblebee.wire import packets
+from bumblebee.wire import packets, realtime
 from bumblebee.wire.clock import Clock
 from bumblebee.wire.guard_process import END, RECORD
 from bumblebee.wire.job import Job, decode_job, encode_job
@@ -172,6 +172,16 @@ def test_the_policys_process_answers_the_newest_question_and_ends_with_its_guard
     ours.shutdown(socket.SHUT_WR)
     serve(Quick(), Quick(), theirs, 3)  # type: ignore[arg-type]
     assert [decode_answer(message, 3).tick for message in packets.received(ours)] == [2]
+
+
+def test_the_last_core_is_the_guards_where_there_are_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    placed = list[list[int]]()
+    monkeypatch.setattr(os, "sched_setaffinity", lambda pid, cores: placed.append(list(cores)), raising=False)
+    for cores in ({0, 1, 5}, {3}):
+        monkeypatch.setattr(os, "sched_getaffinity", lambda pid, cores=cores: cores, raising=False)
+        for guard in (True, False):
+            realtime._place(guard)
+    assert placed == [[5], [0, 1]]
 
 
 def test_the_brain_that_is_kept_warm_answers_the_last_question_again_and_nobody_hears_it() -> None:
