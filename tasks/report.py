@@ -7,10 +7,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from bumblebee.evaluation.summary import comparisons
 from bumblebee.learning.pretrained import NAMES
+from bumblebee.measured.rollout import read_rollout
+from bumblebee.measured.wire_note import noted_latency
 from bumblebee.motion.store import read_index
 from bumblebee.ranges import Line, Ranged, Seed
 from bumblebee.report.clusters_section import clusters_section
@@ -72,7 +75,7 @@ def main() -> None:
 def collect(shape: Loop) -> LoopResults:
     """Read what the stages left."""
     library, evaluation = read_index(paths.MOTIONS), _json(paths.EVALUATION / "summary.json")
-    base = _json(paths.BASE / "card.json")
+    base, wire = _json(paths.BASE / "card.json"), wire_latency(shape)
     return LoopResults(
         library=library,
         skipped=_table(paths.MOTIONS / "skipped.csv", ("file", "reason")),
@@ -84,11 +87,12 @@ def collect(shape: Loop) -> LoopResults:
         evaluation=with_reference(evaluation),
         contract=_json(paths.EVALUATION / "contract.json"),
         published=_json(paths.PUBLISHED),
-        sealed=sealed_truth(),
+        sealed=sealed_truth(wire),
         rounds=tuple(round_results(turn, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
         pretrained=base.get("parent") in NAMES.values(),
         base_trained_on=base.get("kept") != "parent",
         points=pd.read_parquet(points) if (points := paths.CLUSTERS / "map.parquet").exists() else None,
+        wire=wire,
     )
 
 
@@ -104,9 +108,24 @@ def with_reference(evaluation: dict[str, Any]) -> dict[str, Any]:
     return {**evaluation, "comparisons": [*evaluation["comparisons"], *added]}
 
 
-def sealed_truth() -> dict[str, Any] | None:
-    """Sealed effects of the stand-in; None where the measured rollouts are of the user's robot."""
-    return _json(paths.SEALED_ROBOT) if load("rollouts", RolloutsConfig).source is None else None
+def sealed_truth(wire: float | None = None) -> dict[str, Any] | None:
+    """Sealed effects of the stand-in, and the latency of its `wire` [s]; None where the robot is the user's."""
+    if load("rollouts", RolloutsConfig).source is not None:
+        return None
+    sealed = _json(paths.SEALED_ROBOT)
+    late = {"effect": "command_delay", "where": [], "parameters": {"delay": wire}, "unit": "s"}
+    return sealed if wire is None else {**sealed, "effects": [*sealed["effects"], late]}
+
+
+def wire_latency(shape: Loop) -> float | None:
+    """Median latency of the wire [s] that the stand-in's rollouts note; None where they came over none."""
+    config = load("rollouts", RolloutsConfig)
+    if config.source is not None or config.wire == "none":
+        return None
+    folders = [paths.rollouts(turn.n, cluster) for turn in shape.rounds for cluster in shape.clusters]
+    files = [file for folder in folders for file in (folder / "rollouts").glob("*.parquet")]
+    noted = [noted_latency(str(read_rollout(file).meta.get("notes", ""))) for file in files]
+    return float(np.median(known)) if (known := [late for late in noted if late is not None]) else None
 
 
 def curves(shape: Loop) -> Iterator[tuple[str, pd.DataFrame]]:

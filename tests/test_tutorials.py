@@ -19,7 +19,7 @@ from tests.motion.human.people import bvh
 
 DOCS = Path(__file__).parent.parent / "docs"
 SHARED = Path(__file__).parents[2] / "shared" / "data"
-PAGES = sorted(page.name for page in [*DOCS.glob("tutorial-*.md"), DOCS / "faq.md"])
+PAGES = sorted(page.name for page in [*DOCS.glob("tutorial-*.md"), DOCS / "faq.md", DOCS / "deploy.md"])
 ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 
 

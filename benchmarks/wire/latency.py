@@ -5,11 +5,10 @@ import os
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
-import numpy as np
+import psutil
 
-from benchmarks.wire.common import clips, shipped
+from benchmarks.wire.common import lasting, shipped
 from bumblebee.wire.journal import read_journal
 from bumblebee.wire.phases import Phase
 from bumblebee.wire.rollouts import latency
@@ -18,10 +17,7 @@ from bumblebee.wire.session import run as deploy
 
 
 def run(options: argparse.Namespace) -> None:
-    clip = clips(["arm_circles"])[0]  # begins and ends in the relaxed stand
-    times = max(1, round(60 * options.minutes / clip.duration))
-    arrays = ("root_pos", "root_quat", "joint_pos", "key_pos")
-    long = replace(clip, **{name: np.concatenate([getattr(clip, name)] * times) for name in arrays})
+    long = lasting(60 * options.minutes)
     at = str(options.out.absolute() / "sockets") if options.wire == "sim" else ""
     words = [
         sys.executable,
@@ -37,11 +33,17 @@ def run(options: argparse.Namespace) -> None:
     try:
         time.sleep(8)
         job = Run(shipped().folder, long, options.wire, options.out, at, unattended=True, operator="benchmark")
+        before, begun = psutil.cpu_times(), psutil.Process(robot.pid).cpu_times().user
         ended, _ = deploy(job, print)
+        busy = psutil.Process(robot.pid).cpu_times().user - begun
     finally:
         robot.terminate()
         robot.wait()
-    print(f"{len(os.sched_getaffinity(0))} cores; load {os.getloadavg()[0]:.1f}; ended by {ended.reason or 'itself'}")
+    spent = {name: now - then for name, now, then in zip(before._fields, psutil.cpu_times(), before, strict=True)}
+    whole, cores = sum(spent.values()), len(os.sched_getaffinity(0))
+    shares = ", ".join(f"{name} {spent[name] / whole:.1%}" for name in ("user", "system", "idle", "steal"))
+    print(f"{cores} cores: {shares}; the robot {busy / whole * cores:.0%} of one")
+    print(f"load {os.getloadavg()[0]:.1f}; ended by {ended.reason or 'itself'}; {', '.join(ended.told['permitted'])}")
     print("\n".join(ended.numbers.lines(ended.numbers.table())[1:]))
     newest = max((options.out / "journals").iterdir(), key=lambda path: path.stat().st_mtime)
     rows = read_journal(newest)[1]

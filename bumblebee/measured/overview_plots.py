@@ -92,8 +92,8 @@ def bars(errors: dict[str, float], unit: str) -> str:
     return _svg(ROW * len(errors) + 4, "tracking error by joint", "".join(rows))
 
 
-def plot(trace: Trace, slide: bool) -> str:
-    """Command (grey) and measurement (orange) over time."""
+def plot(trace: Trace, slide: bool, headed: bool = True) -> str:
+    """Command (grey) and measurement (orange) over time; `headed` where nothing else says whose they are."""
     low = float(min(trace.command.min(), trace.measured.min()))
     high = float(max(trace.command.max(), trace.measured.max()))
     span, end = (high - low) or 1.0, float(trace.time[-1]) or 1.0
@@ -108,8 +108,8 @@ def plot(trace: Trace, slide: bool) -> str:
     position, error = ("m", "mm") if slide else ("rad", "mrad")
     label = f"{trace.motion}: {trace.joint}, {rounded(1000 * trace.error)} {error}"
     label = label if len(label) <= 58 else f"{label[:57]}…"
-    text = (
-        f"<text x='0' y='12' {FONT}>{escape(label)}</text>"
+    text = f"<text x='0' y='12' {FONT}>{escape(label)}</text>" if headed else ""
+    text += (
         f"<text x='0' y='{TOP + 9}' {FONT}>{rounded(high)}</text>"
         f"<text x='0' y='{TOP + 22}' {FONT}>{position}</text>"
         f"<text x='0' y='{HEIGHT - BOTTOM}' {FONT}>{rounded(low)}</text>"

@@ -20,6 +20,10 @@ _NOTHING = (
     "0 % lost without it: the tests hold the effect for real, but the others predict the held-out rollouts as well. "
     "It may matter in other motions."
 )
+_WIRE = (
+    "The measured rollouts came over a wire (rollouts.wire: lcm), behind the guard of bumblebee deploy run: {:.1f} ms "
+    "from a state's stamp to the drives. That latency is the whole robot's command delay; success is measured without."
+)
 _ON_ROBOT, _ON_DECLARED = ("on the robot", "on the declared model")
 
 
@@ -47,7 +51,7 @@ def opening_lines(results: LoopResults) -> list[str]:
     lines += [paid] if (paid := price(results, turn)) else []
     for *row, share in effect_rows(results, turn):
         lines.append(" -> ".join(row) + f" (lost without it: {share})")
-    lines += [*_remarks(turn), error_line(turn)]
+    lines += [*_remarks(results, turn), error_line(turn)]
     for step in _steps(results, turn):
         told = [f"{percent(rate)} {where}" for rate, where in _rates(results, step) if rate is not None]
         lines.append(f"{step.called}: {', '.join(told)}")
@@ -144,7 +148,7 @@ def _effects(results: LoopResults, turn: RoundResults) -> list[Block]:
         header = ("undeclared", "found", "lost without it")
     shown = [pairs(header, rows, "effects")] if rows else []
     nothing = [] if rows or results.sealed is not None else [text("No effect passed the tests: the model stands.")]
-    return [*shown, *nothing, *(note(line) for line in _remarks(turn)), text(error_line(turn))]
+    return [*shown, *nothing, *(note(line) for line in _remarks(results, turn)), text(error_line(turn))]
 
 
 def _rows(results: LoopResults, turn: RoundResults) -> list[tuple[str | Cell, ...]]:
@@ -192,10 +196,11 @@ def _left_over(diagnosis: Json) -> str:
     return f"not named, but flagged: structure left in {places(left['where'])}, depending on {depends}"
 
 
-def _remarks(turn: RoundResults) -> list[str]:
-    """Explain a share of 0 %, and say what was undone at the joint."""
+def _remarks(results: LoopResults, turn: RoundResults) -> list[str]:
+    """Say what is the wire's, explain a share of 0 %, and say what was undone at the joint."""
     nothing = any(_share(effect).startswith("0") for effect in turn.diagnosis["effects"])
-    return [line for line in (_NOTHING if nothing else "", compensation_line(turn.compensation)) if line]
+    wire = "" if results.wire is None else _WIRE.format(1e3 * results.wire)
+    return [line for line in (wire, _NOTHING if nothing else "", compensation_line(turn.compensation)) if line]
 
 
 def _share(effect: Json | None) -> str:

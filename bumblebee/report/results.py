@@ -53,7 +53,8 @@ class LoopResults:
     published: Json
     """data/published.json."""
     sealed: Json | None
-    """data/sealed/robot.json, opened at the very end; None where the measured rollouts are of the user's robot."""
+    """data/sealed/robot.json, opened at the very end, with the latency of the `wire`; None where the measured rollouts
+    are of the user's robot."""
     rounds: tuple[RoundResults, ...] = ()
     """The turns with the robot."""
     pretrained: bool = False
@@ -65,6 +66,8 @@ class LoopResults:
     """Points of the map, a row a motion; None where the clustering kept none."""
     players: dict[str, str] = field(default_factory=dict)
     """Markup of the 3D replays: "motions", and "windows-rN" for each round."""
+    wire: float | None = None
+    """Median latency of the wire that the stand-in's rollouts came over, by its own stamps [s]; None for none."""
 
     @property
     def real_robot(self) -> bool:

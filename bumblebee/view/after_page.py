@@ -64,9 +64,10 @@ def _curve(measured: Rollout, joint: int, error: float) -> Block:
     assert measured.joint_target is not None
     name, time = measured.joints[joint], measured.time - measured.time[0]
     motion = str(measured.meta.get("motion", ""))
-    drawn = plot(Trace(motion, name, error, time, measured.joint_target[:, joint], measured.joint_pos[:, joint]), False)
-    svg = drawn.replace("<svg ", "<svg xmlns='http://www.w3.org/2000/svg' ", 1)
-    return image(f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}", name, f"{1000 * error:.0f} mrad RMS")
+    trace = Trace(motion, name, error, time, measured.joint_target[:, joint], measured.joint_pos[:, joint])
+    svg = plot(trace, slide=False, headed=False).replace("<svg ", "<svg xmlns='http://www.w3.org/2000/svg' ", 1)
+    uri = f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}"
+    return image(uri, name, f"{1000 * error:.0f} mrad RMS")
 
 
 def _next(measured: Rollout, out: Path, workspace: Path) -> list[Block]:

@@ -3,12 +3,16 @@
 from collections.abc import Mapping
 from typing import Any
 
-from bumblebee.report.page import Block, Cell, Section, button, note, pairs, render, table, text, warning
+from bumblebee.report.page import Block, Cell, Section, button, heading, note, pairs, render, table, text, warning
 
 STOP_PATH = "/stop"
 OLD = 2.0
 """Age of what is shown beyond which the page says so [s]; the console shows something four times a second."""
 
+_STAGES = (
+    "wake: how late a tick begins. take, think, send: its parts. policy: an answer, in its own process. state age: "
+    "that of the newest state when an order goes out."
+)
 _PHASES = {
     "WAIT": "No torque. The operator's g at the console lets it stand up.",
     "RISE": "It goes to the motion's first frame, slowly.",
@@ -24,16 +28,14 @@ def live_page(run: Mapping[str, Any], facts: Mapping[str, Any] | None, age: floa
     """The page's HTML.
 
     Args:
-        run: `policy`, `motion`, `frames` of it, `robot` (simulated or REAL), `sheet` (a line, or "").
+        run: `policy`, its `hz`, `motion`, its `seconds`, `robot` (simulated or REAL), `sheet` (a line, or "").
         facts: newest of `bumblebee.wire.watcher.facts_of`; None before the first.
         age: of the facts [s].
     """
-    sections = [Section("halt", "Stop", tuple(_halt())), Section("now", "Now", tuple(_now(run, facts or {}, age)))]
+    now = _now(run, facts or {}, age)
     if facts and facts.get("times"):
-        sections += [
-            Section("rules", "Rules", (_rules(facts),)),
-            Section("times", "Times of the guard's ticks", (_times(facts),)),
-        ]
+        now += [heading("Rules"), _rules(facts), heading("Times of the guard's ticks"), _times(facts)]
+    sections = [Section("halt", "Stop", tuple(_halt())), Section("now", "Now", tuple(now))]
     subtitle = f"{run.get('motion', '?')}, policy {run.get('policy', '?')}, {run.get('robot', '?')}"
     return render("A run on a robot", subtitle, "", sections, live=True)
 
@@ -46,17 +48,17 @@ def _now(run: Mapping[str, Any], facts: Mapping[str, Any], age: float) -> list[B
     if not phase:
         return [*blocks, text("Robot and policy are checked; nothing moves.")]
     step, asking = str(facts["step"]), ", ".join(facts["now"]) or "none"
-    torque = f"{100 * facts['torque']:.0f} %, {facts['torque_joint']}" if facts["torque"] is not None else "–"
+    share = _number(None if facts["torque"] is None else 100 * facts["torque"], " % of its limit")
     end = f"{facts['room_rad']:.2f} rad, {facts['room_joint']}" if facts["room_rad"] is not None else "–"
     rows: list[tuple[str, str | Cell]] = [
         ("phase", Cell(phase, tip=_PHASES.get(phase, ""))),
         ("answer of the guard", Cell(step, mark="missed" if step in ("HOLD", "DAMP", "OFF") else "")),
         ("rules that ask for it", asking),
-        ("motion", f"tick {max(facts['tick'], 0)} of {run.get('frames', '?')}"),
+        ("motion", _place(run, max(facts["tick"], 0))),
         ("pelvis leans", _number(facts["lean_deg"], "° from upright")),
         ("pelvis height", _number(facts["height_m"], " m", 2)),
-        ("largest torque, of its limit", torque),
-        ("nearest end of a joint", end),
+        ("largest torque", f"{share}, {facts['torque_joint']}"),
+        ("nearest joint end", end),
         ("hottest motor", _number(facts["hottest"], " °C")),
         ("missed ticks", Cell(str(facts["missed"]), mark="missed" if facts["missed"] else "")),
         ("ticks logged", f"{facts['records']:,}"),
@@ -70,15 +72,23 @@ def _halt() -> list[Block]:
 
 
 def _rules(facts: Mapping[str, Any]) -> Block:
-    rows = [(name, f"{count:,}", "now" if name in facts["now"] else "") for name, count in facts["rules"].items()]
+    rows = [(name, f"{count:,}", "yes" if name in facts["now"] else "") for name, count in facts["rules"].items()]
     if not rows:
         return text("No rule has asked for anything.")
-    return table(("rule", "ticks in which it asked", ""), rows, "Warnings are normal now and then.", "rules")
+    return table(("rule", "ticks in which it asked", "asks now"), rows, "Warnings are normal now and then.", "rules")
 
 
 def _times(facts: Mapping[str, Any]) -> Block:
     rows = [(name, *(f"{value:.2f}" for value in values)) for name, values in facts["times"].items()]
-    return table(("ms", "p50", "p99", "worst"), rows, "", "times")
+    return table(("ms", "p50", "p99", "worst"), rows, _STAGES, "times")
+
+
+def _place(run: Mapping[str, Any], tick: int) -> str:
+    """Time in the motion, and its length; beyond its end the policy stands."""
+    if "hz" not in run:
+        return f"tick {tick}"
+    at, whole = tick / run["hz"], run["seconds"]
+    return f"{at:.1f} of {whole:.1f} s" if at <= whole else f"over after {whole:.1f} s; stands on its last frame"
 
 
 def _number(value: float | None, unit: str, digits: int = 0) -> str:

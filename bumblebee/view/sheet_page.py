@@ -40,16 +40,17 @@ def _order(sheet: Sheet) -> list[Block]:
 
 def _row(one: Tried) -> tuple[str | Cell, ...]:
     low, high = one.ci95
-    share = Cell(f"{100 * one.share:.0f} % [{100 * low:.0f}, {100 * high:.0f}]", shade=1.0 - one.share)
+    share = f"{100 * one.share:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
     end = f"{abs(one.room_rad):.2f} rad{' beyond' if one.room_rad < 0 else ''}, {one.room_joint}"
-    return one.motion, share, f"{one.fell}", f"{one.damped}", f"{one.tilt_deg:.0f}°", end, watch(one)
+    fell, damped = (f"{count} of {one.robots}" for count in (one.fell, one.damped))
+    return one.motion, share, fell, damped, f"{one.tilt_deg:.0f}°", end, watch(one)
 
 
 def _uses(sheet: Sheet) -> Block:
     rules = [*DAMPING, "torque"]
     rows = [[one.motion, *(_use(one, rule) for rule in rules)] for one in sheet.tried]
     caption = (
-        "Largest on any robot that did not fall; 100 % is where the rule acts. Torque beyond is cut, the others damp."
+        "Largest on any robot that did not fall. At 100 % the rule acts; red is beyond. Torque is cut, the others damp."
     )
     return table(("motion", *rules), rows, caption, "share of the guard's limits")
 
@@ -72,7 +73,7 @@ def _stop(sheet: Sheet) -> list[Block]:
     ]
     return [
         text("The guard damps by itself, on this sheet's limits:"),
-        table(("rule", "damps at"), rows, "", "limits of the guard"),
+        pairs(("rule", "damps at"), rows, "limits of the guard"),
         text(
             "Stop by hand, before that, when the robot leans further than its motion's largest tilt above, when a rule "
             "damps twice for the same reason, when a motor is warm, or when anything sounds new."

@@ -23,3 +23,8 @@ class Clock:
         left = deadline - self.now()
         if left > 0:
             time.sleep(left * self.slow / SECOND)
+
+    def spin_until(self, deadline: int) -> None:
+        """Keep the core until a deadline [ns] that is near."""
+        while self.now() < deadline:
+            pass

@@ -60,6 +60,7 @@ class Guard:
         self._asked, self._due = -1, 0  # when the newest question was asked [ns], -1 for none that is open; until when
         self._begin, self._rise = np.zeros(len(drives.joints)), 0.0
         self._kept: Wish | None = None
+        self._judged: tuple[Moment, Wish] | None = None
 
     @property
     def finished(self) -> bool:
@@ -78,6 +79,13 @@ class Guard:
     def told(self, now: int, keys: Keys) -> None:
         """Take what the console said."""
         self._keys, self._keys_came = keys, now
+
+    def warm(self) -> None:
+        """Judge the last tick once more and forget it, so that the next finds what it needs in the core's caches."""
+        if self._judged is not None:
+            moment, sent = self._judged
+            tripped(moment, self._drives, self._plan.limits)
+            cut(moment.state, sent, self._drives, self._plan.limits)
 
     def tick(self, now: int, missed: int = 0) -> Tick:
         """Decide on the order of this tick.
@@ -103,6 +111,7 @@ class Guard:
             worst = next(name for name, asked in rules.items() if asked is step)
             self._end(worst, Phase.OFF if step is Step.OFF or self.phase is Phase.WAIT else Phase.DAMP, now)
         sent, over = self._sent(state, wish, step)
+        self._judged = moment, sent
         self._watch.look(state, over, self.phase is Phase.RUN)
         return self._tick(now, sent, wish, question, step, rules)
 

@@ -17,6 +17,7 @@ def run_robot(
     slow: float = 1.0,
     seconds: float | None = None,
     say: Callable[[str], None] = lambda line: None,
+    make: Callable[[Sequence[Json], RobotSettings, int], WireRobot] = WireRobot,
 ) -> WireRobot:
     """Let the robot live on a wire.
 
@@ -28,10 +29,11 @@ def run_robot(
         slow: how much slower than real time.
         seconds: when to end, in the robot's time; None for no end.
         say: told when the mode changes.
+        make: makes the robot from its effects, settings and the time of its boot [ns].
     """
     clock, link = Clock(slow), open_link(wire, [ORDER], at)
     begun = clock.now()
-    robot, mode = WireRobot(effects, settings, begun), None
+    robot, mode = make(effects, settings, begun), None
     try:
         while seconds is None or clock.now() - begun < seconds * SECOND:
             now = clock.now()

@@ -15,6 +15,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
+from bumblebee.measured.wire_note import wire_note
 from bumblebee.wire.phases import Phase
 from bumblebee.wire.rules import RULES, Step
 
@@ -47,7 +48,7 @@ def rollout_of(about: Mapping[str, Any], rows: np.ndarray) -> Rollout:
     cut = int((np.abs(then["target"] - then["wanted"]) > 1e-6).any(axis=1).sum())
     notes += [f"safety cut targets in {cut} of {len(asks)} rows"] if cut else []
     late = latency(rows)
-    notes += [f"wire: stamp to drives {1e3 * late.median:.1f} ms, worst {1e3 * late.worst:.1f} ms"] if late else []
+    notes += [wire_note(late.median, late.worst)] if late else []
     meta = {
         key: about[key]
         for key in ("robot", "motion", "policy", "recorded_at", "operator", "compensation")

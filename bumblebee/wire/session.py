@@ -80,7 +80,8 @@ def run(
     check(card, state, wanted)
     kind = "simulated" if card.simulated else "REAL"
     if watcher:
-        about = {"policy": job.policy.name, "motion": job.clip.name, "frames": job.clip.frames}
+        hz = float(policy.contract["control_hz"])
+        about = {"policy": job.policy.name, "motion": job.clip.name, "seconds": job.clip.duration, "hz": hz}
         watcher.show({"run": about | {"robot": f"{card.name}, {kind}"}})
     say(f"{card.name}, {kind}, {card.state_hz:g} states a second: nothing refused")
     controller, frames = new_controller(), job.clip.frames

@@ -103,7 +103,7 @@ def outcome(tried: Tried) -> str:
     """One motion's result in a few words."""
     low, high = tried.ci95
     lost = f"fell on {tried.fell}, damped on {tried.damped} of {tried.robots} robots"
-    return f"{lost}: {100 * tried.share:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
+    return f"{lost}: not to the end on {100 * tried.share:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
 
 
 def _try(

@@ -7,7 +7,7 @@ bytes; the rollout is made of the guard's journal. The robot knows of its base w
 has no `base_pos`, whatever the plan's `base` says. A plan's `stop` is the guard's rule `tilt`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import ROBOT
 from bumblebee.wire.brain import Brain
 from bumblebee.wire.intake import numbers_for
-from bumblebee.wire.journal import layout, record
+from bumblebee.wire.journal import Entry, layout, record
 from bumblebee.wire.limits import Limits, drives_of
 from bumblebee.wire.line import LineFaults
 from bumblebee.wire.phases import Ramps
@@ -74,15 +74,32 @@ def rehearsed(
     undone: Compensation | None = None,
 ) -> tuple[Rehearsal, np.ndarray]:
     """A run, and its journal's records."""
-    brain, robot = (
-        Brain(policy, clip, undone),
-        WireRobot(effects, RobotSettings(seed=seed, states=LINE, orders=LINE), 0),
-    )
+    run = prepared(policy, clip, effects, seed, limits, undone)
+    return run, records_of(run, run.entries())
+
+
+def prepared(
+    policy: ExportedPolicy,
+    clip: Clip,
+    effects: Sequence[Json],
+    seed: int,
+    limits: Limits = Limits(),  # noqa: B008  (frozen)
+    undone: Compensation | None = None,
+) -> Rehearsal:
+    """A run before it begins."""
+    brain = Brain(policy, clip, undone)
+    robot = WireRobot(effects, RobotSettings(seed=seed, states=LINE, orders=LINE), 0)
     every, numbers = round(ORDER_HZ / float(policy.contract["control_hz"])), numbers_for(policy.sensors)
     plan = Plan(7, robot.card.robot, every, clip.frames, brain.hold(), numbers, True, limits, QUICK)
-    run, joints = Rehearsal(robot, brain, plan, drives_of(policy.contract)), len(robot.card.joints)
+    run = Rehearsal(robot, brain, plan, drives_of(policy.contract))
     run.longest += clip.frames / clip.fps
-    return run, np.frombuffer(b"".join(record(entry, joints) for entry in run.entries()), layout(joints))
+    return run
+
+
+def records_of(run: Rehearsal, entries: Iterable[Entry]) -> np.ndarray:
+    """Records of a journal of these entries of a run."""
+    joints = len(run.robot.card.joints)
+    return np.frombuffer(b"".join(record(entry, joints) for entry in entries), layout(joints))
 
 
 def _about(episode: Episode, policy: ExportedPolicy, undone: Compensation | None) -> dict[str, object]:

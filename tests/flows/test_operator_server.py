@@ -79,7 +79,7 @@ def test_the_console_drops_what_nobody_takes_and_forgets_who_is_gone() -> None:
 def test_the_page_shows_the_newest_facts_and_says_when_they_are_old(both: tuple[Watcher, Shown]) -> None:
     watcher, shown = both
     assert "nothing moves" in shown.page()
-    watcher.show({"run": {"motion": "<squat>", "frames": 186, "robot": "g1, REAL"}})
+    watcher.show({"run": {"motion": "<squat>", "seconds": 3.7, "hz": 50.0, "robot": "g1, REAL"}})
     watcher.show({"run": {"sheet": "run sheet: 1 of 2"}})
     for tick in range(3):
         watcher.show(FACTS | {"tick": tick})
@@ -89,7 +89,7 @@ def test_the_page_shows_the_newest_facts_and_says_when_they_are_old(both: tuple[
         "&lt;squat&gt;",
         "g1, REAL",
         "run sheet: 1 of 2",
-        "tick 2 of 186",
+        "0.0 of 3.7 s",
         "soft_zone",
         "1,234",
         "not measured",

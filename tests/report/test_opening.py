@@ -12,7 +12,7 @@ from bumblebee.report.page import Block
 from bumblebee.report.results import LoopResults
 from bumblebee.report.success_steps import step_differences, success_steps
 from bumblebee.report.truth import match
-from tests.report.made import LAW, PLAN, TRUTH, difference, found, page_of, won_back
+from tests.report.made import DELAY, LAW, PLAN, TRUTH, difference, found, page_of, won_back
 
 
 def of(results: LoopResults, kind: str) -> list[Block]:
@@ -150,6 +150,16 @@ def test_what_was_undone_at_the_joint_is_one_line_above_and_a_table_below() -> N
     made = page_of(won_back())
     beside = [made.index(f"{title}</h3>") for title in ("simulator lacked", "without training", "before and after")]
     assert beside == sorted(beside)
+
+
+def test_rollouts_that_came_over_a_wire_are_said_to_and_its_latency_is_no_false_alarm() -> None:
+    late = {**DELAY, "where": [], "parameters": {"delay": 0.008}}
+    value = {"delay": {"value": 0.0075, "ci95": [0.0065, 0.0085], "unit": "s"}}
+    delay = {**found("command_delay"), "where": [], "parameters": value}
+    made = replace(won_back([late], [delay]), wire=0.008)
+    assert [mark for _, mark in effects(made)[0]] == ["", "found", ""]
+    assert any("8.0 ms from a state's stamp" in line for line in opening_lines(made))
+    assert "came over a wire" in page_of(made) and "came over a wire" not in page_of(won_back())
 
 
 def test_an_effect_that_was_found_by_name_is_not_taken_for_a_law_without_one() -> None:

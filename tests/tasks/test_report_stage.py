@@ -8,12 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bumblebee.measured.rollout import Rollout
+from bumblebee.measured.rollout import Rollout, write_rollout
+from bumblebee.measured.wire_note import wire_note
 from bumblebee.report.film_choice import Choice
 from bumblebee.report.filmstrip import Film
 from bumblebee.report.results import RoundResults
 from bumblebee.robot.facts import joint_names, stand_pose
 from tasks import film, paths, report
+from tasks.sections import Loop, Round
 from tests.report.made import loop_results
 
 
@@ -26,6 +28,24 @@ def test_the_seal_is_not_taken_for_the_truth_about_a_real_robot(
     paths.SEALED_ROBOT.parent.mkdir(parents=True)
     paths.SEALED_ROBOT.write_text('{"effects": []}')
     assert report.sealed_truth() == expected
+
+
+def test_the_wires_latency_is_among_what_the_declared_model_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its median over the rollouts of all clusters, as they note it."""
+    monkeypatch.chdir(tmp_path)
+    Path("params.yaml").write_text("rollouts: {wire: lcm}\n")
+    paths.SEALED_ROBOT.parent.mkdir(parents=True)
+    paths.SEALED_ROBOT.write_text('{"effects": []}')
+    shape = Loop(("c0", "c1"), (Round(1, 0),), 1)
+    assert report.wire_latency(shape) is None
+    for cluster, late in (("c0", 0.0079), ("c1", 0.0083)):
+        noted = replace(rollout(20), meta={"notes": f"ran to the end; {wire_note(late, 0.03)}"})
+        write_rollout(paths.rollouts(1, cluster) / "rollouts" / "r.parquet", noted)
+    late = report.wire_latency(shape)
+    (effect,) = report.sealed_truth(late)["effects"]
+    assert late == pytest.approx(0.0081) and effect["parameters"] == {"delay": late} and effect["where"] == []
 
 
 def rollout(frames: int) -> Rollout:

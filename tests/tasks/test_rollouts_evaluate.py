@@ -13,9 +13,11 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.learning.export import write_export
 from bumblebee.measured.rollout import Rollout, read_dataset, read_rollout, write_rollout
+from bumblebee.measured.wire_note import noted_latency
 from bumblebee.motion.store import write_library
 from bumblebee.tracking.library import AHEAD
-from tasks import evaluate, paths, rollouts, seal
+from tasks import evaluate, ingest, paths, report, rollouts, seal
+from tasks.sections import Loop, Round
 from tests.deploy.conftest import linear_onnx, nod
 
 PARAMS = """
@@ -49,7 +51,7 @@ def workspace(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     """A copy of it to work in, without MLflow."""
     shutil.copytree(made, tmp_path / "work")
     monkeypatch.chdir(tmp_path / "work")
-    for module in (rollouts, evaluate):
+    for module in (rollouts, evaluate, ingest):
         monkeypatch.setattr(module, "log_run", lambda *_, **__: None)
     return tmp_path / "work"
 
@@ -236,14 +238,14 @@ def test_an_experts_success_is_one_curve_over_the_rounds() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("wire", "module"), [("none", "bumblebee.deploy.stand_in"), ("lcm", "bumblebee.wire.stand_in")]
-)
-def test_the_settings_say_whether_the_stand_in_runs_over_the_wire(
-    wire: str, module: str, workspace: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", f"motions: 1, wire: {wire},"))
-    started = list[list[str]]()
-    monkeypatch.setattr(rollouts, "start_stand_in", lambda *given, module: started.append(list(module)))
+def test_a_round_over_the_wire_is_taken_in_as_any_other(workspace: Path, sealed: Callable[..., None]) -> None:
+    over_wire = PARAMS.replace("motions: 1, repeats: 2,", "motions: 1, repeats: 1, wire: lcm,")
+    (workspace / "params.yaml").write_text(f"{over_wire}ingest: {{}}\ngate: {{}}\n")
+    sealed()
     rollouts.main(round=1, cluster="c0")
-    assert started == [["-m", module]]
+    (rollout,) = read_dataset(workspace / "data/rollouts/r1/c0").rollouts
+    noted = noted_latency(rollout.meta["notes"])
+    assert noted and report.wire_latency(Loop(("c0",), (Round(1, 0),), 1)) == noted and rollout.base_pos is None
+    ingest.main(round=1)
+    taken = json.loads((paths.measured(1) / "summary.json").read_text())
+    assert (taken["accepted"], taken["quarantined"]) == (1, 0)

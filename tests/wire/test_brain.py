@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from bumblebee import quaternions
 from bumblebee.deploy.compensation_plan import compensate
 from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.runner import reference_library
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.wire.align import aligned
-from bumblebee.wire.brain import Brain, OneRobot
+from bumblebee.wire.brain import Brain, OneClip, OneRobot
 from bumblebee.wire.messages import State, layout_of
 from bumblebee.wire.questions import Question, decode_answer, encode_answer
 from tests.deploy.conftest import nod
@@ -40,6 +42,16 @@ def test_forward_kinematics_of_one_robot_are_those_over_a_motion() -> None:
     rng = np.random.default_rng(1)
     pose = rng.standard_normal((1, 3)), quaternions.normalised(rng.standard_normal((1, 4))), rng.uniform(-1, 1, (1, 23))
     np.testing.assert_allclose(OneRobot()(*pose), forward_key_positions(*pose), atol=1e-9)
+
+
+def test_references_looked_up_before_the_run_are_those_of_the_library(shipped: ExportedPolicy) -> None:
+    """Every tick of the clip, the one before it, and those after its end."""
+    clip, none = nod(frames=12), torch.zeros(1, dtype=torch.long)
+    whole, once = reference_library(shipped, [clip]), OneClip(shipped, clip)
+    for tick in range(30):
+        time = torch.full((1,), tick / 50)
+        for name, value in vars(whole.frames(none, time)).items():
+            assert torch.equal(value, getattr(once.frames(none, time), name)), (tick, name)
 
 
 def test_where_a_robot_booted_and_how_it_was_turned_changes_nothing(shipped: ExportedPolicy) -> None:

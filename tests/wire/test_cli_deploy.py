@@ -1,10 +1,12 @@
 """`bumblebee deploy`: what cannot be run is one line and status 2, and each line's remedy works as printed."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from bumblebee import cli_deploy
+from bumblebee.deploy.stand_in_effects import read_sealed
 from tests.test_commands import run
 
 ALONE = ("--unattended", "--clip", "squat")
@@ -31,6 +33,14 @@ def test_what_cannot_be_run_is_one_line(capsys: pytest.CaptureFixture[str], tmp_
     ):
         assert expected in refused(capsys, *words, *(("--out", out) if words[0] == "run" else ()))
     assert not out.exists()
+
+
+def test_the_worn_robot_of_the_docs_is_sealed_with_what_they_say() -> None:
+    home = Path(__file__).parents[2]
+    (named,) = re.findall(r"--sealed (\S+\.json)", (home / "docs" / "deploy.md").read_text())
+    knee, shoulder = read_sealed(home / named)
+    assert knee["parameters"] == {"frictionloss": 4.0} and "knee" in knee["where"][0]
+    assert shoulder["parameters"] == {"offset": 0.1} and "shoulder" in shoulder["where"][0]
 
 
 def test_a_registered_name_without_a_registry_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

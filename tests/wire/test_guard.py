@@ -185,3 +185,17 @@ def test_with_a_dead_mans_key_the_run_ends_when_the_operator_says_so() -> None:
     ends = 1
     small.until(Phase.DAMP)
     assert small.guard.reason == ""
+
+
+def test_judging_a_tick_once_more_changes_nothing() -> None:
+    warm, cold = (Small(plan(frames=10), **changed(joint_pos=HOLD + 0.3)) for _ in range(2))
+    warm.at = cold.at = 0.5
+    while not cold.guard.finished:
+        for small in (warm, cold):
+            small.run(TICK)
+        warm.guard.warm()
+    assert [tick.phase for tick in warm.ticks] == [tick.phase for tick in cold.ticks]
+    assert all(
+        np.array_equal(one.order.target, other.order.target) and one.rules == other.rules
+        for one, other in zip(warm.ticks, cold.ticks, strict=True)
+    )

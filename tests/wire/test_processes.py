@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import pytest
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning.export import export_shipped
 from bumblebee.measured.rollout import read_rollout
-from bumblebee.wire import packets
+from bumblebee.wire import packets, realtime
 from bumblebee.wire.clock import Clock
 from bumblebee.wire.guard_process import END, RECORD
 from bumblebee.wire.job import Job, decode_job, encode_job
@@ -27,7 +28,14 @@ from bumblebee.wire.link import open_link
 from bumblebee.wire.messages import ORDER, STATE, Mode, Order
 from bumblebee.wire.phases import Phase
 from bumblebee.wire.policy_process import serve
-from bumblebee.wire.questions import decode_question, encode_answer
+from bumblebee.wire.questions import (
+    Answer,
+    Question,
+    decode_answer,
+    decode_question,
+    encode_answer,
+    encode_question,
+)
 from bumblebee.wire.rollouts import ended_by
 from bumblebee.wire.session import Run, run
 from tests.deploy.conftest import nod
@@ -154,18 +162,47 @@ def test_when_the_policy_hangs_the_guard_damps_and_says_why(tmp_path: Path) -> N
 
 
 def test_the_policys_process_answers_the_newest_question_and_ends_with_its_guard() -> None:
-    from bumblebee.wire.questions import Question, decode_answer, encode_question
-
     class Quick:
-        def answer(self, question: Question) -> object:
+        def answer(self, question: Question) -> Answer:
             return answer_to(question)
 
     ours, theirs = packets.pair()
     for tick in range(3):
         packets.send(ours, encode_question(Question(tick, tick, state()), CODEC))
     ours.shutdown(socket.SHUT_WR)
-    serve(Quick(), theirs, 3)  # type: ignore[arg-type]
+    serve(Quick(), Quick(), theirs, 3)  # type: ignore[arg-type]
     assert [decode_answer(message, 3).tick for message in packets.received(ours)] == [2]
+
+
+def test_the_last_core_is_the_guards_where_there_are_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    placed = list[list[int]]()
+    monkeypatch.setattr(os, "sched_setaffinity", lambda pid, cores: placed.append(list(cores)), raising=False)
+    for cores in ({0, 1, 5}, {3}):
+        monkeypatch.setattr(os, "sched_getaffinity", lambda pid, cores=cores: cores, raising=False)
+        for guard in (True, False):
+            realtime._place(guard)
+    assert placed == [[5], [0, 1]]
+
+
+def test_the_brain_that_is_kept_warm_answers_the_last_question_again_and_nobody_hears_it() -> None:
+    again = threading.Event()
+
+    class Warm:
+        def answer(self, question: Question) -> None:
+            again.set()
+
+    class Quick:
+        def answer(self, question: Question) -> Answer:
+            return answer_to(question)
+
+    ours, theirs = packets.pair()
+    packets.send(ours, encode_question(Question(5, 5, state()), CODEC))
+    serving = threading.Thread(target=serve, args=(Quick(), Warm(), theirs, 3))
+    serving.start()
+    assert again.wait(30.0)
+    ours.shutdown(socket.SHUT_WR)
+    serving.join()
+    assert [decode_answer(message, 3).tick for message in packets.received(ours)] == [5]
 
 
 LCM = pytest.param("lcm", marks=[pytest.mark.slow, pytest.mark.skipif(not lcm_here(), reason="no lcm or multicast")])
