@@ -13,12 +13,13 @@ import argparse
 import json
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import torch
 
+from benchmarks.baselines.methods import changed
 from bumblebee.learning import pretrained
 from bumblebee.learning.learners import make_learner
 from bumblebee.learning.policy import Policy, load_policy
@@ -67,16 +68,18 @@ def weak_knee(physics_hz: float) -> World:
 ROBOTS: dict[str, Callable[[float], World]] = {"knee": weak_knee, "demo": named_by_the_demo}
 
 
-def settings(learner: str) -> RefineConfig:
-    """Those of the stage `refine`, on one thread."""
+def settings(learner: str, changes: Sequence[str] = ()) -> RefineConfig:
+    """Those of the stage `refine`, on one thread, with single ones changed (`world_model.policy_rate=0.0005`)."""
     file = HOME / "params.yaml" if learner == "ppo" else HOME / "profiles" / "world_model.yaml"
     config = params.section_of(params.read(file), "refine", RefineConfig, file)
-    return replace(config, env=replace(config.env, threads=1))
+    return changed(replace(config, env=replace(config.env, threads=1)), list(changes))
 
 
-def refined(learner: str, clips: list[Clip], world: World, seconds: float, seed: int) -> tuple[Policy, int]:
+def refined(
+    learner: str, clips: list[Clip], world: World, seconds: float, seed: int, changes: Sequence[str] = ()
+) -> tuple[Policy, int]:
     """The shipped policy after so many seconds of training, and the control steps that it saw."""
-    config = settings(learner)
+    config = settings(learner, changes)
     engine = make_engine("mujoco", world.model, config.env.num_worlds, 1, world.hooks)
     env = TrackingEnv(MotionLibrary(clips, config.env.ahead), engine, config.env, seed)
     endless = replace(config.algorithm, iterations=_ENDLESS, checkpoint_every=_ENDLESS)
@@ -109,6 +112,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--seconds", type=float, default=120.0, help="of CPU time, each")
     parser.add_argument("--out", type=Path, required=True, help="file to add lines to")
+    parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
     options = parser.parse_args()
     torch.set_num_threads(1)
     world = ROBOTS[options.robot](settings("ppo").env.physics_hz)
@@ -117,14 +121,9 @@ def main() -> None:
     before = tried(load_policy(pretrained.FOLDER), clips, world)
     for seed in options.seeds:
         learned = [clip for clip in clips if clip.split == "train"]
-        policy, frames = refined(options.learner, learned, world, options.seconds, seed)
-        row = {
-            "learner": options.learner,
-            "robot": options.robot,
-            "seed": seed,
-            "seconds": options.seconds,
-            "frames": frames,
-        }
+        policy, frames = refined(options.learner, learned, world, options.seconds, seed, options.set)
+        given = {name: getattr(options, name) for name in ("learner", "robot", "seconds", "set")}
+        row = given | {"seed": seed, "frames": frames}
         row |= {"before": before, "after": tried(policy, clips, world)}
         with options.out.open("a") as file:
             file.write(json.dumps(row) + "\n")
