@@ -14,6 +14,7 @@ from typing import Any
 
 from bumblebee.errors import BadInput
 from tasks import registry
+from tasks.run_form import flatten
 
 # How drivers and clients say that a lab's PostgreSQL or S3 does not answer, under whatever MLflow makes of it.
 AWAY = re.compile(
@@ -88,7 +89,7 @@ def away(text: str) -> BadInput | None:
 def _plain(run: dict[str, Any]) -> dict[str, Any]:
     """The run in what JSON knows."""
     curve = None if run["curve"] is None else str(run["curve"])
-    return {**run, "params": registry.flatten(run["params"]), "curve": curve}
+    return {**run, "params": flatten(run["params"]), "curve": curve}
 
 
 def main() -> int:

@@ -84,6 +84,7 @@ def collect(shape: Loop) -> LoopResults:
         elbow=pd.read_csv(paths.CLUSTERS / "elbow.csv"),
         clusters=_json(paths.CLUSTERS / "summary.json"),
         curves=dict(curves(shape)),
+        learners=dict(learners(shape)),
         evaluation=with_reference(evaluation),
         contract=_json(paths.EVALUATION / "contract.json"),
         published=_json(paths.PUBLISHED),
@@ -128,16 +129,27 @@ def wire_latency(shape: Loop) -> float | None:
     return float(np.median(known)) if (known := [late for late in noted if late is not None]) else None
 
 
-def curves(shape: Loop) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Each policy's learning curve, where it has one."""
+def folders_of(shape: Loop) -> dict[str, Path]:
+    """Folder of each policy by its name in the report."""
     folders = {"base": paths.BASE}
     for number in range(shape.final_round + 1):
         for cluster in shape.clusters:
             folders[f"expert-{cluster} r{number}"] = paths.expert(number, cluster)
-    folders["generalist"] = paths.GENERALIST
-    for name, folder in folders.items():
+    return folders | {"generalist": paths.GENERALIST}
+
+
+def curves(shape: Loop) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Each policy's learning curve, where it has one."""
+    for name, folder in folders_of(shape).items():
         if (folder / "curve.csv").exists():
             yield name, pd.read_csv(folder / "curve.csv")
+
+
+def learners(shape: Loop) -> Iterator[tuple[str, str]]:
+    """Learner of each policy, where its card names one."""
+    for name, folder in folders_of(shape).items():
+        if (folder / "card.json").exists() and (learner := _json(folder / "card.json").get("learner")):
+            yield name, learner
 
 
 def round_results(turn: Round, clusters: tuple[str, ...]) -> RoundResults:

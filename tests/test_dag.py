@@ -73,7 +73,7 @@ NO_RESULT = {
     "tasks/parent.py": "ends with the process that started it",
     "tasks/recorder.py": "what MLflow is told",
     "bumblebee/measured/gate_record.py": "a copy of what was answered, which no stage reads",
-    "tasks/registry.py": "what MLflow is told",
+    "tasks/registry/": "what MLflow is told",
     "tasks/outputs.py": "what MLflow is told",
     "tasks/database.py": "keeps what MLflow is told",
     "tasks/private.py": "who may look at what DVC keeps",

@@ -22,9 +22,10 @@ from bumblebee.io.write import new_folder, write_file
 from bumblebee.learning import pretrained
 from bumblebee.learning.checkpoint import load_checkpoint
 from bumblebee.learning.policy import load_policy
+from bumblebee.learning.world_model.accuracy import HORIZONS
 from bumblebee.learning.world_model.continuing import Continued, ContinuedTrainer, Parent, continue_model
 from bumblebee.learning.world_model.measured import Measured, measured
-from bumblebee.learning.world_model.residual import HORIZONS, corrected, fit_residual, new_residual, predicted_error
+from bumblebee.learning.world_model.residual import corrected, fit_residual, new_residual, predicted_error
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files, write_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import make_library

@@ -38,6 +38,7 @@ def card_of(
         "schema": 1,
         "stage": "train",
         "parent": None if before is None else config["start"],
+        "learner": learner.name,
         "iterations": learner.iteration,
         "frames": learner.frames,
         "training_clips": [clip.name for clip in clips if clip.split == "train"],

@@ -10,7 +10,7 @@ from bumblebee.tracking.needs import needed
 from bumblebee.tracking.terms import expanded
 
 GENTLE = PpoConfig(learning_rate=1e-4, learning_rate_range=(1e-5, 1e-3), desired_kl=0.01, desired_kl_end=0.01)
-"""PPO from a policy that can follow motions already: higher rates make it forget (docs/training.md)."""
+"""PPO from a policy that can follow motions already: higher rates make it forget (docs/training-studies.md)."""
 FROM_NOTHING = PpoConfig(
     epochs=5,
     hidden=(512, 256, 128),

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import torch
 
@@ -27,15 +27,6 @@ from bumblebee.tracking.env import TrackingEnv
 
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 _SEEN = ("ahead", "terms", "history", "now", "action", "transformer", "observation", "actions")
-
-
-class Schedule(Protocol):
-    """Settings of a learner that the loop reads."""
-
-    iterations: int
-    steps: int
-    hidden: tuple[int, ...]
-    checkpoint_every: int
 
 
 class Learner(ABC):

@@ -1,4 +1,4 @@
-"""Learning curves: success and keypoint error against frames, as lines that the mouse reads off."""
+"""Learning curves against frames, as lines that the mouse reads off."""
 
 import numpy as np
 import pandas as pd
@@ -9,19 +9,23 @@ _POINTS = 200  # of a line: what a page shows
 _MEASURES = {
     "success": ("episodes that end well", 100.0, "%"),
     "key_error": ("key body error", 100.0, "cm"),
+    "loss_model": ("loss of the learned model of the robot", 1.0, ""),
+    "alive": ("imagined steps before an end", 100.0, "%"),
 }
+"""Columns that are drawn: name, factor and unit; the last two are the learner's `world_model` alone."""
 
 
 def curves_charts(curves: dict[str, pd.DataFrame], title: str, caption: str) -> list[Block]:
     """A block for each measure; empty without curves.
 
     Args:
-        curves: name -> columns frames, success, key_error [m] (rows an iteration); smoothed here over 5 % of the rows.
+        curves: name -> columns frames, success, key_error [m] and others of `_MEASURES` (rows an iteration); smoothed
+            here over 5 % of the rows.
         title: what the curves are of.
         caption: small print under each.
     """
-    usable = {n: c for n, c in curves.items() if len(c) > 1 and {"frames", *_MEASURES} <= set(c.columns)}
-    seen = {measure: {n: c for n, c in usable.items() if c[measure].notna().any()} for measure in _MEASURES}
+    usable = {n: c for n, c in curves.items() if len(c) > 1 and "frames" in c}
+    seen = {m: {n: c for n, c in usable.items() if m in c and c[m].notna().any()} for m in _MEASURES}
     return [_chart(found, measure, title, caption) for measure, found in seen.items() if found]
 
 
@@ -32,7 +36,7 @@ def _chart(curves: dict[str, pd.DataFrame], measure: str, title: str, caption: s
         for policy, curve in curves.items()
     }
     last = max(float(curve["frames"].max()) for curve in curves.values())
-    most = 100.0 if measure == "success" else max(float(values.max()) for values in smooth.values()) or 1.0
+    most = 100.0 if unit == "%" else max(float(values.max()) for values in smooth.values()) or 1.0
     lines = tuple((policy, _points(curves[policy]["frames"] / last, smooth[policy] / most)) for policy in curves)
     scale, words = _frames_unit(last)
     return Block(
@@ -40,7 +44,7 @@ def _chart(curves: dict[str, pd.DataFrame], measure: str, title: str, caption: s
         title=f"{title}: {name}",
         caption=caption,
         alt=f"Learning curves of {', '.join(curves)}: {name} against simulated frames.",
-        header=("0", f"{most:.3g} {unit}", f"{last / scale:.3g}{words} frames"),
+        header=("0", f"{most:.3g} {unit}".strip(), f"{last / scale:.3g}{words} frames"),
         rows=lines,
         facts={"most": f"{most:.6g}", "unit": unit, "frames": f"{last:.0f}"},
     )

@@ -9,7 +9,7 @@ from bumblebee.report.success_steps import DECLARED, names
 from bumblebee.report.truth import match
 from bumblebee.report.wording import change, plural
 
-_MOTIONS = "Next: raise refine.ppo.iterations in params.yaml, then start the same command again."
+_MOTIONS = "Next: raise refine.{}.iterations in params.yaml, then start the same command again."
 _MEASURE = "Next: more rollouts tell more: raise rollouts.repeats in params.yaml, then start the same command again."
 _MEASURE_REAL = "Next: more rollouts tell more: other motions, at other speeds, with other loads."
 
@@ -65,7 +65,14 @@ def _lost(results: LoopResults) -> str:
     if not rows:
         return ""
     told = ", ".join(f"{group} {100 * rate:.0f} % of {plural(count, 'motion')}" for rate, group, count in sorted(rows))
-    return f"Not followed to the end by {label(results, last)} {ENGINES[engine]}: {told}. {_MOTIONS}"
+    do = _MOTIONS.format(_refiner(results))
+    return f"Not followed to the end by {label(results, last)} {ENGINES[engine]}: {told}. {do}"
+
+
+def _refiner(results: LoopResults) -> str:
+    """The learner of the last round's experts; PPO, the default, where none is known."""
+    end = f" r{results.rounds[-1].n}" if results.rounds else " r0"
+    return next((by for name, by in results.learners.items() if name.endswith(end)), "ppo")
 
 
 def _unnamed(results: LoopResults, turn: RoundResults) -> str:

@@ -42,8 +42,15 @@ def training_section(results: LoopResults) -> Section:
         "Generalist": (rest, "By DAgger from the final experts."),
     }
     for name, (curves, caption) in groups.items():
-        blocks += curves_charts(curves, name, caption)
+        blocks += curves_charts(curves, name, " ".join([caption, *_by(results, list(curves))]))
     return Section("training", "Learning", tuple(blocks))
+
+
+def _by(results: LoopResults, policies: list[str]) -> list[str]:
+    """A sentence for each learner: which of these policies it trained."""
+    told = [(results.learners[name], name) for name in policies if name in results.learners]
+    named = {learner: [name for by, name in told if by == learner] for learner, _ in told}
+    return [f"Learner {learner}: {', '.join(names)}." for learner, names in named.items()]
 
 
 def success_section(results: LoopResults) -> Section:

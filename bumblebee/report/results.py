@@ -64,6 +64,8 @@ class LoopResults:
 
     points: pd.DataFrame | None = None
     """Points of the map, a row a motion; None where the clustering kept none."""
+    learners: dict[str, str] = field(default_factory=dict)
+    """Policy, named as in `curves` -> the learner that trained it, as the settings name it."""
     players: dict[str, str] = field(default_factory=dict)
     """Markup of the 3D replays: "motions", and "windows-rN" for each round."""
     wire: float | None = None

@@ -6,7 +6,6 @@ policy has a student, "student".
 """
 
 from collections.abc import Callable
-from dataclasses import fields
 from functools import partial
 from typing import Any
 
@@ -19,16 +18,18 @@ from bumblebee.sim.cuda_graph import Captured
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.groups import Group
+from bumblebee.tracking.in_place import renewed
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame, over_robot
 from bumblebee.tracking.observations import action_middle, action_scale, middle_targets
-from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_worlds, regular_push
+from bumblebee.tracking.pushes import Pushes
+from bumblebee.tracking.randomisation import randomise_worlds
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.sampler import ClipSampler, ClipShares
+from bumblebee.tracking.sampler import ClipShares
 from bumblebee.tracking.sensor_errors import SensorErrors
 from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.statistics import Statistics
-from bumblebee.tracking.stretches import StretchSampler
+from bumblebee.tracking.stretches import StretchSampler, sampler_of
 from bumblebee.tracking.terminations import fallen, threshold_at
 from bumblebee.tracking.terms import expanded, see
 from bumblebee.tracking.terrain import Ground
@@ -75,10 +76,7 @@ class TrackingEnv(VecEnv):
         self._earned: Callable[[Step], Tensor] = torch.compile(own.__call__, dynamic=False) if compiled else own
         self.limits = Limits.of_robot(config.reward.soft_limit, device)
         drawing = (config.sampler_floor, config.sampler_memory, config.start_share, clip_share)
-        stretch = round(config.sampler_stretch / self.dt)
-        self.sampler: ClipSampler | StretchSampler = (
-            StretchSampler(library.length, stretch, *drawing) if stretch else ClipSampler(library.length, *drawing)
-        )
+        self.sampler = sampler_of(library.length, round(config.sampler_stretch / self.dt), *drawing)
         self.statistics, self._generator = Statistics(device), torch.Generator(device).manual_seed(seed)
         randomise_worlds(engine, config.randomisation, seed)
         self._threshold = torch.zeros((), device=device)
@@ -98,8 +96,7 @@ class TrackingEnv(VecEnv):
         self._rewards = torch.zeros(n, device=device)
         self._dones = torch.zeros(n, dtype=torch.bool, device=device)
         self._time_outs = torch.zeros_like(self._dones)
-        self._push_clock = push_phase(config.randomisation, n, self.dt, device)
-        self._pushed = torch.zeros_like(self._dones)
+        self.pushes = Pushes(config.randomisation, n, self.dt, device)
         self._restart(torch.ones_like(self._dones))
         engine.settle()
         self._state, self._ref = self._read(), self._coming()
@@ -143,11 +140,6 @@ class TrackingEnv(VecEnv):
         return self._state, self._ref
 
     @property
-    def pushed(self) -> Tensor:
-        """Worlds (B,) bool that were pushed at the end of the last step; the next step writes over it."""
-        return self._pushed
-
-    @property
     def limit(self) -> Tensor:
         """`threshold` [m] as a tensor () that stays where it is."""
         return self._threshold
@@ -189,13 +181,14 @@ class TrackingEnv(VecEnv):
             tensor.copy_(saved[name])
         for name, own in self.groups.items():
             own.show(saved[f"{name}_exact"], saved[f"{name}_noisy"])
-        self._show(saved["privileged"])
-        self._keep(self._read(), self._coming())
+        self._privileged = renewed(self._privileged, saved["privileged"], self._recorded)
+        self._move_on()
         self._generator.set_state(saved["generator"].cpu())
 
     def _kept(self) -> dict[str, Tensor]:
         """Tensors that a step leaves for the next, beside state and reference, which follow from it."""
-        kept = {name: getattr(self, f"_{name}") for name in ("clip", "frame", "action", "action_before", "push_clock")}
+        kept = {name: getattr(self, f"_{name}") for name in ("clip", "frame", "action", "action_before")}
+        kept["push_clock"] = self.pushes.clock
         for group, own in self.groups.items():
             kept |= {f"{group}_{name}": tensor for name, tensor in own.kept().items()}
         if self.ground is not None:
@@ -251,24 +244,11 @@ class TrackingEnv(VecEnv):
         if self.errors is not None and self.errors.drifts:
             self.errors.now.copy_(self.errors.after(self.errors.now, (self._state, state), self.dt, self._generator))
         self._restart(self._dones)
-        self._push()
+        self.pushes.apply(self.engine, self._generator)
 
     def _fallen(self, step: Step) -> Tensor:
         """Robots (B,) bool that a step leaves lying."""
         return fallen(step.state, step.ref)
-
-    def _push(self) -> None:
-        """Apply this step's random pushes."""
-        config = self.cfg.randomisation
-        self._push_clock += 1
-        if config.push and config.push_regular:
-            push: Tensor | None = regular_push(config, self._push_clock, self.dt, self._generator)
-        else:
-            push = draw_push(config, self.num_envs, self.dt, self._generator)
-        self._pushed.zero_()
-        if push is not None:
-            self.engine.push(push)
-            self._pushed.copy_(push.any(-1))
 
     def _restart(self, over: Tensor) -> None:
         """Put the robots `over` (B,) bool at new starts."""
@@ -291,26 +271,16 @@ class TrackingEnv(VecEnv):
     def _look(self) -> None:
         """The state, the reference of the coming step, and the observations of both; noise is drawn meanwhile."""
         draws = [self._aside(partial(group.draws, self._generator)) for group in self.groups.values()]
-        self._keep(self._read(), self._coming())
+        self._move_on()
         fresh = Rows(self.episode_length_buf == 0, self.engine.by_mask)
         for group, begun in zip(self.groups.values(), draws, strict=True):
             group.look(self._state, self._ref, self._action, fresh, self._generator, begun)
-        self._show(self._extended(self.groups["policy"].exact))
+        self._privileged = renewed(self._privileged, self._extended(self.groups["policy"].exact), self._recorded)
 
-    def _show(self, privileged: Tensor) -> None:
-        """Let this (B, D + extras) be what the critic sees now."""
-        if self._recorded:
-            self._privileged.copy_(privileged)
-        else:
-            self._privileged = privileged
-
-    def _keep(self, state: RobotState, ref: ReferenceFrame) -> None:
-        """State and reference for the coming step; where work is recorded, in the tensors that it was recorded with."""
-        if self._recorded:
-            _copy(state, self._state)
-            _copy(ref, self._ref)
-        else:
-            self._state, self._ref = state, ref
+    def _move_on(self) -> None:
+        """Take the state and the reference of the coming step."""
+        self._state = renewed(self._state, self._read(), self._recorded)
+        self._ref = renewed(self._ref, self._coming(), self._recorded)
 
     def _coming(self) -> ReferenceFrame:
         """The reference at the end of the coming control period."""
@@ -328,11 +298,3 @@ class TrackingEnv(VecEnv):
         )
         beside = [see(self._critic, self._state, self._ref, self._action)] if self._critic else []
         return torch.cat((exact, *beside, *extras), dim=-1)
-
-
-def _copy(source: RobotState | ReferenceFrame, into: RobotState | ReferenceFrame) -> None:
-    """Write every tensor of `source` into the tensor of the same name."""
-    for item in fields(source):
-        value = getattr(source, item.name)
-        if value is not None:
-            getattr(into, item.name).copy_(value)

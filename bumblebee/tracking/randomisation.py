@@ -1,4 +1,4 @@
-"""Worlds that differ (paper, appendix B, table of domain randomisation), and pushes.
+"""Worlds that differ (paper, appendix B, table of domain randomisation).
 
 | row of the table | here |
 |---|---|
@@ -7,18 +7,14 @@
 | Link mass, U(0.8, 1.2) x default | `mass` 0.2: each body's mass and inertia by one factor |
 | P gain, D gain, U(0.75, 1.25) x default | `gains` 0.25: each servo's P and D by factors of their own |
 | Control delay, U(20, 40) ms | `delay`: one for all commands of a world, need not be a whole number of physics steps |
-| Push robot, interval 10 s, v_xy 0.5 m/s | `push`, `push_interval`, `push_regular` |
+| Push robot, interval 10 s, v_xy 0.5 m/s | `push`, `push_interval`, `push_regular`: `tracking.pushes` |
 | Terrain type, flat, rough | `tracking.terrain` |
 
 Drawn once for each world. `strength` and `frictionloss` are ours.
 """
 
-import math
-
 import mujoco
 import numpy as np
-import torch
-from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.sim.engine import Engine
@@ -77,37 +73,3 @@ def _check_buffers(model: mujoco.MjModel, longest: float) -> None:
     if (room < model.actuator_delay + longest).any():
         came, do = "a model without room for it", "Load it with tracking.model.task_model."
         raise BadInput("env.randomisation.delay", f"buffers for {1e3 * longest:g} ms", came, do)
-
-
-def push_phase(config: Randomisation, n: int, dt: float, device: torch.device) -> Tensor:
-    """Control steps (n,) by which the worlds' clocks of regular pushes are ahead, spread over the interval."""
-    return torch.arange(n, device=device) * _every(config, dt) // n
-
-
-def regular_push(config: Randomisation, clock: Tensor, dt: float, generator: torch.Generator) -> Tensor:
-    """Velocities (n, 3) [m/s] to add to the roots: `push`, its heading drawn, where a clock (n,) ends an interval."""
-    due = (clock % _every(config, dt) == 0) & (clock > 0)
-    heading = 2 * math.pi * torch.rand(len(clock), generator=generator, device=clock.device)
-    speed = config.push * due
-    return torch.stack((speed * heading.cos(), speed * heading.sin(), torch.zeros_like(heading)), dim=-1)
-
-
-def _every(config: Randomisation, dt: float) -> int:
-    """Control steps between regular pushes."""
-    return max(round(config.push_interval / dt), 1)
-
-
-def draw_push(config: Randomisation, n: int, dt: float, generator: torch.Generator) -> Tensor | None:
-    """Velocities (n, 3) [m/s] to add to the roots in this control step, mostly zero, on the generator's device.
-
-    None if nobody is ever pushed, or, on a CPU, where a look costs nothing, nobody now.
-    """
-    if not config.push:
-        return None
-    device = generator.device
-    pushed = torch.rand(n, generator=generator, device=device) < dt / config.push_interval
-    if device.type == "cpu" and not bool(pushed.any()):
-        return None
-    heading = 2 * math.pi * torch.rand(n, generator=generator, device=device)
-    speed = config.push * torch.rand(n, generator=generator, device=device) * pushed
-    return torch.stack((speed * heading.cos(), speed * heading.sin(), torch.zeros_like(speed)), dim=-1)

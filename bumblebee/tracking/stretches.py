@@ -8,7 +8,7 @@ lost in it.
 import torch
 from torch import Tensor
 
-from bumblebee.tracking.sampler import Chances, ClipShares
+from bumblebee.tracking.sampler import Chances, ClipSampler, ClipShares
 
 
 class StretchSampler:
@@ -79,3 +79,11 @@ class StretchSampler:
         fails = zeros.index_add(0, at, lost.float())
         keep = self.memory**count
         self.failure.copy_(keep * self.failure + (1 - keep) * fails / count.clamp(min=1))
+
+
+def sampler_of(
+    length: Tensor, stretch: int, floor: float, memory: float, start_share: float, shares: ClipShares | None
+) -> ClipSampler | StretchSampler:
+    """A sampler of stretches of so many frames; with 0 frames, of clips. Arguments as of `StretchSampler`."""
+    drawing = (floor, memory, start_share, shares)
+    return StretchSampler(length, stretch, *drawing) if stretch else ClipSampler(length, *drawing)

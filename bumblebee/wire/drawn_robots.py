@@ -10,7 +10,8 @@ from bumblebee.sim.sensors import load_spec
 from bumblebee.sim.world_fields import MASSES
 from bumblebee.tracking.config import Randomisation
 from bumblebee.tracking.model import add_delays
-from bumblebee.tracking.randomisation import draw_fields, push_phase, regular_push
+from bumblebee.tracking.pushes import push_phase, regular_push
+from bumblebee.tracking.randomisation import draw_fields
 
 
 class DrawnRobots(NominalRobots):

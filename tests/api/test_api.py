@@ -48,7 +48,9 @@ def test_the_examples_of_the_page_run():
     for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S):
         exec(block, scope)
     assert {path.name for path in Path("policy").iterdir()} == FILES
-    assert json.loads(Path("policy/card.json").read_text())["parent"] == "shipped"
+    card = json.loads(Path("policy/card.json").read_text())
+    assert (card["parent"], card["learner"]) == ("shipped", "ppo")
+    assert "- learner: ppo\n" in Path("policy/README.md").read_text()
     assert [path.name for path in Path().glob(".*")] == []  # checkpoints are gone
     assert bb.load_policy("policy").shape.actions == 23
 

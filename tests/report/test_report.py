@@ -97,6 +97,18 @@ def test_a_base_policy_that_was_not_made_here_is_said() -> None:
     assert "from the policy that comes along" in captions and "from scratch" not in captions
 
 
+def test_the_page_says_which_learner_trained_a_policy_and_draws_its_own_columns() -> None:
+    made = loop_results([found()], [TRUTH])
+    refined = made.curves["base"].assign(loss_model=[0.5, 0.3, 0.2], alive=[0.8, 0.9, 0.97])
+    by = {"expert-c0 r0": "ppo", "expert-c0 r1": "world_model"}
+    told = replace(made, curves=made.curves | {"expert-c0 r1": refined}, learners=by)
+    drawn = {block.title: block for block in training_section(told).blocks if block.title.startswith("Experts")}
+    assert [name for name, _ in drawn["Experts: imagined steps before an end"].rows] == ["expert-c0 r1"]
+    assert [name for name, _ in drawn["Experts: episodes that end well"].rows] == ["expert-c0 r0", "expert-c0 r1"]
+    said = "Learner ppo: expert-c0 r0. Learner world_model: expert-c0 r1."
+    assert all(said in block.caption for block in drawn.values()) and said in page_of(told)
+
+
 def test_a_name_with_a_dollar_is_no_formula_in_a_figure() -> None:
     assert page([found()], [TRUTH], name="$x_{$").count("data:image/svg") > 1
 

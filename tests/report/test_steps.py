@@ -75,11 +75,12 @@ def test_a_refined_policy_that_is_worse_on_the_declared_model_is_said_on_the_fir
     assert price(replace(made, evaluation={**made.evaluation, "comparisons": better}), made.rounds[0]) == ""
 
 
-def test_what_still_fails_is_said_with_a_key_of_params_yaml_that_is_there() -> None:
-    lost, unnamed = next_steps(won_back())
+@pytest.mark.parametrize("learner", ["ppo", "world_model"])
+def test_what_still_fails_is_said_with_a_key_of_params_yaml_that_is_there(learner: str) -> None:
+    lost, unnamed = next_steps(replace(won_back(), learners={"expert-c0 r0": "ppo", "expert-c0 r1": learner}))
     assert "walk 83 % of 36 motions" in lost and "command delay" in unnamed
     keys = [key for line in (lost, unnamed) for key in re.findall(r"raise (\S+) in params.yaml", line)]
-    assert keys == ["refine.ppo.iterations", "rollouts.repeats"]
+    assert keys == [f"refine.{learner}.iterations", "rollouts.repeats"]
     for key in keys:
         section, *names = key.split(".")
         module, name_of = SECTIONS[section].split(":")

@@ -17,6 +17,7 @@ from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import EXIT_BAD_INPUT
 from bumblebee.motion.store import write_library
 from tasks import fetch, registry
+from tasks.registry.models import _policy_files
 from tests.deploy.conftest import nod, policy_folder
 from tests.test_commands import run
 
@@ -140,7 +141,7 @@ def test_a_version_from_before_cards_is_fetched_too(workspace: Path, tmp_path: P
     onnx.save_model(stored, path, save_as_external_data=True, location="weights.data", size_threshold=0)
     exported = ExportedPolicy.load(workspace / "p0.01")
     (tmp_path / "MLmodel").write_text(yaml.safe_dump({"metadata": {"contract": exported.contract}}))
-    policy = ExportedPolicy.load(registry._policy_files(tmp_path))
+    policy = ExportedPolicy.load(_policy_files(tmp_path))
     obs = np.ones((2, 283), np.float32)
     assert np.array_equal(policy.act(obs), exported.act(obs))
     assert policy.contract["exported_onnx_sha256"] == exported.sha256 != policy.sha256

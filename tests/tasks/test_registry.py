@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tasks import lineage, registry
+from tasks import lineage, registry, run_form
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ def workspace(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
 
 
 def test_settings_are_flattened_with_dots():
-    assert registry.flatten(Config()) == {"steps": "4", "ppo.clip": "0.2"}
-    assert registry.flatten(None) == {}
+    assert run_form.flatten(Config()) == {"steps": "4", "ppo.clip": "0.2"}
+    assert run_form.flatten(None) == {}
 
 
 def test_a_curve_is_read_column_by_column_without_its_gaps(tmp_path: Path):
     file = tmp_path / "curve.csv"
     file.write_text("step,loss,kl\n0,2.0,\n10,1.0,0.5\n20,nan,x\n")
-    assert registry.read_curve(file) == [("loss", 0, 2.0), ("loss", 10, 1.0), ("kl", 10, 0.5)]
+    assert run_form.read_curve(file) == [("loss", 0, 2.0), ("loss", 10, 1.0), ("kl", 10, 0.5)]
 
 
 def test_dvc_hash_of_a_folder_is_dvcs_own(tmp_path: Path):
@@ -181,7 +181,7 @@ def test_upstream_is_everything_back_to_the_first_stage(tmp_path: Path) -> None:
     ("name", "kept"), [("before/", "before/unknown"), ("success/a b", "success/a b"), ("x/a:b/c", "x/a_b/c")]
 )
 def test_metric_names_are_such_that_mlflow_takes_them(name: str, kept: str) -> None:
-    assert registry.metric_name(name) == kept
+    assert run_form.metric_name(name) == kept
 
 
 def test_mlflow_reports_no_use_to_its_maker_whoever_asks_the_registry_first() -> None:

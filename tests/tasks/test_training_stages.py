@@ -15,8 +15,9 @@ from bumblebee.learning.policy import load_policy
 from bumblebee.motion.store import write_library
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.sampler import ClipSampler
-from tasks import base, experts, params, refine, training
+from tasks import base, experts, params, refine, report, training
 from tasks.candidates import came_along
+from tasks.sections import Loop, Round
 from tests.tracking.clips import waving
 
 TINY = {
@@ -124,7 +125,9 @@ def test_a_world_model_trains_base_expert_and_refinement_and_no_later_stage_sees
         assert card["learner"] == "world_model" and "ppo" not in card["config"]
         assert card["iterations"] == 2 and card["frames"] == (6 + 2) * 4
         curve = pd.read_csv(folder / "curve.csv")
-        assert {"iteration", "frames", "success", "key_error", "unstable"} <= set(curve)
+        assert {"iteration", "frames", "success", "key_error", "unstable", "loss_model", "alive"} <= set(curve)
+    told = dict(report.learners(Loop(("c0", "c1"), (Round(1, 0),), 1)))
+    assert told == dict.fromkeys(("base", "expert-c1 r0", "expert-c1 r1"), "world_model")
 
 
 def contents(folder: Path) -> tuple[set[str], dict[str, object]]:

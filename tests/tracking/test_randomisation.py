@@ -16,7 +16,8 @@ from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK
-from bumblebee.tracking.randomisation import draw_fields, push_phase, randomise_worlds, regular_push
+from bumblebee.tracking.pushes import push_phase, regular_push
+from bumblebee.tracking.randomisation import draw_fields, randomise_worlds
 from tests.tracking.clips import waving
 
 OFF = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)

@@ -42,7 +42,7 @@ class Collector:
         shown = {"before": self._before, "action": self._last, "earlier": self._earlier}
         self._memory.begin(env.clip, env.frame, body=packed(state), target=target, **shown)
         _, _, done, _ = env.step(action)
-        self._memory.end(done | env.pushed)
+        self._memory.end(done | env.pushes.pushed)
         fresh = done[:, None]
         self._before = torch.where(fresh, self._held(), handed_on(target, self._before))
         self._earlier = self._last.masked_fill(fresh, 0.0)

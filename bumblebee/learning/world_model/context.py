@@ -1,4 +1,4 @@
-"""In what the worlds differ, as a vector for each: what the model is told beside the state."""
+"""What the model is told beside the state: in what the worlds differ, a vector for each, and how many targets act."""
 
 from collections.abc import Mapping
 
@@ -8,6 +8,21 @@ import torch
 from torch import Tensor
 
 from bumblebee.learning.ranks import Ranks
+from bumblebee.learning.world_model.dynamics import past_targets
+from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.randomisation import draw_fields
+
+
+def context_in(env: TrackingEnv, ranks: Ranks | None = None) -> Tensor:
+    """In what the worlds of `env` differ, (N, C), as its world model is told; see `context_of`."""
+    drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
+    return context_of(env.engine.model, drawn, env.num_envs, ranks).to(env.device)
+
+
+def past_in(env: TrackingEnv) -> int:
+    """How many earlier targets may still act on the robots of `env`, with the longest delay that is drawn."""
+    delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
+    return past_targets(delay, env.dt)
 
 
 def context_of(

@@ -14,8 +14,8 @@ from bumblebee.learning.checkpoint import load_checkpoint
 from bumblebee.learning.policy import load_policy
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
-from bumblebee.learning.world_model.context import context_of
-from bumblebee.learning.world_model.dynamics import Dynamics, past_targets
+from bumblebee.learning.world_model.context import context_in, past_in
+from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.model_update import ModelUpdate
 from bumblebee.learning.world_model.policy_update import PolicyUpdate
@@ -23,7 +23,6 @@ from bumblebee.learning.world_model.residual import corrected
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.robot.facts import joint_names
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.randomisation import draw_fields
 
 FILE = "model.pt"
 
@@ -79,16 +78,9 @@ def new_model(frame: Frame) -> Dynamics:
     return Dynamics(len(frame.joints), frame.hidden, frame.dt, frame.context, frame.past)
 
 
-def context_in(env: TrackingEnv) -> Tensor:
-    """In what the worlds of `env` differ, (N, C), as its world model is told."""
-    drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
-    return context_of(env.engine.model, drawn, env.num_envs).to(env.device)
-
-
 def frame_of(env: TrackingEnv, hidden: tuple[int, ...]) -> Frame:
     """Facts of a world model of `env`."""
-    delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
-    return Frame(joint_names(), tuple(hidden), env.dt, context_in(env).shape[1], past_targets(delay, env.dt))
+    return Frame(joint_names(), tuple(hidden), env.dt, context_in(env).shape[1], past_in(env))
 
 
 def fitting(parent: Parent, frame: Frame, where: object) -> Dynamics:

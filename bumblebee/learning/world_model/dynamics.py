@@ -68,6 +68,10 @@ class Dynamics(nn.Module):
         angle = joint_pos(body)
         return torch.cat((features(body), target - angle, before - angle.repeat(1, self._past), context), dim=-1)
 
+    def normalised(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
+        """The network's input (B, 10 + (3 + P) J + C) in units of its spread, bounded."""
+        return ((self.seen(body, target, before, context) - self.mean) / self.std).clamp(-10, 10)
+
     def forward(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
         """The next state (B, 13 + 2 J).
 
@@ -77,8 +81,7 @@ class Dynamics(nn.Module):
             before: (B, P J) [rad] that they were given before it, the last one first; commands may be late.
             context: (B, C).
         """
-        seen = (self.seen(body, target, before, context) - self.mean) / self.std
-        return moved(body, self.layers(seen.clamp(-10, 10)) * self.scale, self.dt)
+        return moved(body, self.layers(self.normalised(body, target, before, context)) * self.scale, self.dt)
 
     def frozen(self) -> "Dynamics":
         """A twin on the same numbers from now on, whose weights want no gradient; compiled code would compute it."""

@@ -15,16 +15,14 @@ import torch
 from torch import Tensor, nn
 
 from bumblebee.learning.delta import Gain, by_rollout, compare, state_error
+from bumblebee.learning.world_model.accuracy import HORIZONS
 from bumblebee.learning.world_model.body import joint_pos
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.measured import Measured
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.ranges import Count, Factor, Few, Range, Ranged, Rate, Widths
 
-HORIZONS = (0.02, 0.2, 0.6)
-"""Seconds after which predictions are compared with what was measured."""
 _STRIDE = 25  # control steps between the windows that judge, as for the delta action
-_REACH = 10.0  # standard deviations beyond which the model sees no further, see `Dynamics.forward`
 
 
 @dataclass(frozen=True)
@@ -138,8 +136,7 @@ def fit_residual(
                 break
         rows = drawn[torch.randint(len(drawn), (config.batch,), device=drawn.device)]
         own = simulated.windows(1, config.batch)
-        seen = model.seen(own.bodies[0], own.targets[0], own.before, own.context)
-        quiet = residual(((seen - model.mean) / model.std).clamp(-_REACH, _REACH)).square().mean()
+        quiet = residual(model.normalised(own.bodies[0], own.targets[0], own.before, own.context)).square().mean()
         loss = _loss(whole, learn, rows, config.window, past, context) + config.quiet * quiet
         adam.zero_grad()
         loss.backward()

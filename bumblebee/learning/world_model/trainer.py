@@ -17,15 +17,14 @@ from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.accuracy import Accuracy, accuracy
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
-from bumblebee.learning.world_model.context import context_of
-from bumblebee.learning.world_model.dynamics import Dynamics, past_targets
+from bumblebee.learning.world_model.context import context_in, past_in
+from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.gpu_memory import world_model_needs
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.model_update import ModelUpdate
 from bumblebee.learning.world_model.policy_update import PolicyUpdate
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.randomisation import draw_fields
 
 ERRORS = "model_error.csv"
 
@@ -69,10 +68,7 @@ class WorldModelTrainer(Learner):
             torch.set_float32_matmul_precision("high")
         self.shape = shape_of(env, config.hidden)
         actor = (origin.actor if origin is not None else new_actor(self.shape, config.noise)).to(device)
-        drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
-        context = context_of(env.engine.model, drawn, env.num_envs, self.ranks).to(device)
-        delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
-        past = past_targets(delay, env.dt)
+        context, past = context_in(env, self.ranks), past_in(env)
         sizes = (env.num_actions, past, context.shape[1])
         self._fit(world_model_needs(config, env.num_envs, self._groups(), *sizes))
         model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1], past).to(device)

@@ -113,7 +113,7 @@ def test_a_push_breaks_a_window() -> None:
         pushed.clear()
         collect(lambda seen: torch.zeros(len(seen), env.num_actions))
         hit = pushed[0] if pushed else torch.zeros(8, dtype=torch.bool)
-        assert torch.equal(env.pushed, hit)
+        assert torch.equal(env.pushes.pushed, hit)
         assert torch.equal(memory.broken[0], hit | (env.episode_length_buf == 0))
         some += int(hit.sum())
     assert some > 0
