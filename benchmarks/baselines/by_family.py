@@ -69,15 +69,17 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("policy", help="name of its folder")
     parser.add_argument("--motions", type=Path, required=True, help="file of benchmarks.motion_pack")
-    parser.add_argument("--declared", type=Path, required=True, help="trials on the robot as it is")
-    parser.add_argument("--drawn", type=Path, required=True, help="trials on robots drawn from a randomisation")
+    parser.add_argument("--declared", type=Path, help="trials on the robot as it is")
+    parser.add_argument("--drawn", type=Path, help="trials on robots drawn from a randomisation")
     return parser.parse_args(arguments)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the table."""
     motions = [row for row in whole_motions(read_pack(options.motions)) if row.group != EMBEDDED]
-    files = {"declared": options.declared, "drawn": options.drawn}
+    files = {name: file for name in ("declared", "drawn") if (file := getattr(options, name)) is not None}
+    if not files:
+        raise BadInput("the command line", "--declared FILE, --drawn FILE or both", "neither")
     print(table({robots: read(file, options.policy, motions) for robots, file in files.items()}))
     return 0
 

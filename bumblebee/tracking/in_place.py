@@ -1,23 +1,23 @@
 """Values that a recording on a GPU reads: they are written into the tensors that it was recorded with."""
 
 from dataclasses import fields
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from torch import Tensor
 
-from bumblebee.sim.engine import RobotState
-from bumblebee.tracking.library import ReferenceFrame
-
-Kept = TypeVar("Kept", Tensor, RobotState, ReferenceFrame)
+Kept = TypeVar("Kept")
 
 
 def renewed(old: Kept, new: Kept, stays: bool) -> Kept:
-    """`new`, or `old` with every tensor of `new` written into its own where it `stays`."""
+    """`new`, a tensor or a dataclass of tensors; where it `stays`, `old` with the numbers of `new` in its tensors."""
     if not stays:
         return new
-    if isinstance(old, Tensor):
-        return old.copy_(new)
-    for item in fields(new):
-        if (value := getattr(new, item.name)) is not None:
-            getattr(old, item.name).copy_(value)
+    into: Any = old
+    given: Any = new
+    if isinstance(given, Tensor):
+        into.copy_(given)
+        return old
+    for item in fields(given):
+        if (value := getattr(given, item.name)) is not None:
+            getattr(into, item.name).copy_(value)
     return old
