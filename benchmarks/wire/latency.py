@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
     ]
     robot = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
-        time.sleep(8)
+        time.sleep(7)
         job = Run(shipped().folder, long, options.wire, options.out, at, unattended=True, operator="benchmark")
         before, begun = psutil.cpu_times(), psutil.Process(robot.pid).cpu_times().user
         ended, _ = deploy(job, print)

@@ -1,82 +1,79 @@
-"""The operator's three pages as pictures for docs/deploy.md: the sheet before a run, the run, and what came.
+"""The operator's three pages as pictures for docs/deploy.md: the sheet before a run, a run, and what came.
 
-Everything is real but the robot: a sheet is made, the simulated robot and a run with its page are started on loopback,
-and a browser looks at each page, as wide as a desk's screen and as a phone's.
+    bumblebee deploy sheet shipped --clip squat --clip walk --clip kick_right --out sheet
+    bumblebee deploy run shipped --clip walk --unattended --out deployed        # beside `bumblebee deploy robot`
+    python -m benchmarks.wire.pictures sheet deployed --out docs/pictures
 
-    python -m benchmarks.wire.pictures --out docs/pictures       (--slow 4 on a busy machine)
+The live page is that of the middle of the newest run, from its journal.
 """
 
 import argparse
 import io
 import shutil
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 from PIL import Image
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import sync_playwright
 
+from benchmarks.wire.common import shipped
 from bumblebee.io.write import write_file
-from flows import login
+from bumblebee.view.after_page import after_page
+from bumblebee.view.operator_page import live_page
+from bumblebee.view.sheet_page import sheet_page
+from bumblebee.wire.journal import read_journal
+from bumblebee.wire.limits import Limits, drives_of
+from bumblebee.wire.phases import Phase
+from bumblebee.wire.rollouts import ended_by
+from bumblebee.wire.screen import Numbers
+from bumblebee.wire.sheet_file import read_sheet
+from bumblebee.wire.watcher import facts_of
 
-CLIPS = ("squat", "walk", "kick_right")
-WIDTHS = {1440: 900, 390: 844}
+WIDTHS = {1440: 1000, 390: 844}
 """Width -> height of a screen [px]."""
 _LARGEST = 60_000  # bytes
-_BUMBLEBEE = [sys.executable, "-m", "bumblebee", "deploy"]
 
 
 def main() -> None:
     """Write `operator-sheet`, `operator-live` and `operator-after` of each width into the output folder."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.wire.pictures")
+    parser.add_argument("sheet", type=Path)
+    parser.add_argument("deployed", type=Path)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--slow", type=float, default=1.0, help="times slower than real time")
     options = parser.parse_args()
-    work = Path(tempfile.mkdtemp())
-    chosen = [word for clip in CLIPS for word in ("--clip", clip)]
-    subprocess.run([*_BUMBLEBEE, "sheet", "shipped", *chosen], cwd=work, check=True)
-    with sync_playwright() as started:
+    live, after = pages(options.deployed)
+    for name, page in (("sheet", sheet_page(read_sheet(options.sheet))), ("live", live), ("after", after)):
+        look(page, options.out / f"operator-{name}")
+
+
+def pages(deployed: Path) -> tuple[str, str]:
+    """The live page in the middle of the newest run, and the page after it."""
+    journal = max((deployed / "journals").iterdir(), key=lambda path: path.stat().st_mtime)
+    (about, rows), drives = read_journal(journal), drives_of(shipped().contract)
+    running = rows[rows["phase"] == Phase.RUN]
+    numbers, whole = Numbers(len(drives.joints)), Numbers(len(drives.joints))
+    numbers.add(rows[: len(rows) - len(running) // 2].tobytes())
+    whole.add(rows.tobytes())
+    seconds = int(running["answers"].max()) / about["control_hz"]
+    run = {"policy": about["policy"]["name"], "motion": about["motion"], "robot": "g1_23dof, simulated"}
+    run |= {"hz": about["control_hz"], "seconds": seconds}
+    live = live_page(run, facts_of(numbers, numbers.table(), drives, Limits()), 0.1)
+    rollout = deployed / "rollouts" / f"{journal.stem}.parquet"
+    counts = dict(whole.rules.most_common())
+    return live, after_page(ended_by(rows), counts, whole.missed, rollout, Path("deployed"), Path())
+
+
+def look(page: str, path: Path) -> None:
+    """Save what each screen shows of a page."""
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as started:
+        file = Path(folder) / "page.html"
+        file.write_text(page)
         browser = started.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        look(browser, (work / "sheet" / "sheet.html").as_uri(), options.out / "operator-sheet")
-        live(browser, work, options)
-        (after,) = (work / "deployed" / "pages").glob("*.html")
-        look(browser, after.as_uri(), options.out / "operator-after")
+        for width, height in WIDTHS.items():
+            shown = browser.new_page(viewport={"width": width, "height": height}, java_script_enabled=False)
+            shown.goto(file.as_uri())
+            save(path.with_name(f"{path.name}{'' if width > 1000 else f'-{width}'}.webp"), shown.screenshot())
         browser.close()
-    shutil.rmtree(work)
-
-
-def live(browser: Browser, work: Path, options: argparse.Namespace) -> None:
-    """Look at the page while the policy carries the robot."""
-    both = ["--at", str(work / "w"), "--slow", str(options.slow)]
-    robot = subprocess.Popen([*_BUMBLEBEE, "robot", *both], cwd=work, stdout=subprocess.DEVNULL)
-    words = ["run", "shipped", "--clip", "walk", "--sheet", "sheet", "--page", "0", "--unattended", *both]
-    ran = subprocess.Popen([*_BUMBLEBEE, *words], cwd=work, stdout=subprocess.PIPE, text=True)
-    try:
-        assert ran.stdout is not None
-        url = next(line for line in ran.stdout if line.startswith("page: ")).split()[1].rstrip(",")
-        known = {"username": login.USER, "password": str(login.read(work / ".servers"))}
-        look(browser, url, options.out / "operator-live", "text=carries itself", http_credentials=known)
-        ran.stdout.read()
-        ran.wait()
-    finally:
-        robot.terminate()
-        robot.wait()
-
-
-def look(browser: Browser, url: str, path: Path, when: str = "h1", **more: Any) -> None:
-    """Save what the screens show once it is there."""
-    pages = [
-        browser.new_context(viewport={"width": width, "height": height}, **more).new_page()
-        for width, height in WIDTHS.items()
-    ]
-    for page in pages:
-        page.goto(url)
-    for (width, _), page in zip(WIDTHS.items(), pages, strict=True):
-        page.wait_for_selector(when, timeout=120_000)
-        save(path.with_name(f"{path.name}{'' if width > 1000 else f'-{width}'}.webp"), page.screenshot())
-        page.context.close()
 
 
 def save(path: Path, png: bytes) -> None:

@@ -31,7 +31,7 @@ from bumblebee.wire.link import Link, open_link
 from bumblebee.wire.messages import ORDER, STATE
 from bumblebee.wire.phases import Phase
 
-_PATIENCE = 60.0  # s for a run to begin, and to end
+_PATIENCE = 240.0  # s for a run to begin, and to end
 _CLIP = 15.0  # s: longer than any fault and the wait before it
 
 

@@ -98,9 +98,9 @@ class GuardLoop:
 def main() -> None:
     """Run the process."""
     job, ends = decode_job(sys.argv[1]), [socket.socket(fileno=int(number)) for number in sys.argv[2:4]]
+    permitted = harden(GUARD)  # before the wire is opened: its threads take over what the process is permitted
     link = open_link(job.wire, [STATE], job.at)
     loop = GuardLoop(job, link, *ends)
-    permitted = harden(GUARD)
     try:
         ended = loop.run()
     finally:

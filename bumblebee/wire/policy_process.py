@@ -47,7 +47,8 @@ def load(policy: Path, clips: Path, compensation: Path | None) -> tuple[Brain, B
 
 def serve(brain: Brain, warm: Brain, end: socket.socket, joints: int) -> None:
     """Answer until nobody asks any more; `warm` answers the last question again just before the next, for nothing."""
-    codec, newest, wait = Codec(joints), b"", None
+    codec, newest = Codec(joints), b""
+    wait: float | None = None
     while True:
         ready, _, _ = select.select([end], [], [], wait)
         if not ready:

@@ -3,11 +3,15 @@
 import ctypes
 import gc
 import os
+import struct
 from contextlib import suppress
 
 _ALL = 3  # MCL_CURRENT | MCL_FUTURE
-GUARD, POLICY, ROBOT = 60, 50, 40
-"""Priorities: the guard comes before those that it waits for."""
+GUARD, POLICY, ROBOT = 60, 50, 0
+"""Priorities of SCHED_FIFO: the guard comes before the policy. The simulated robot has none: it takes most of a core,
+and Linux stops those that have one for 50 ms once they have taken 95 % of it. It comes before ordinary programs."""
+_AWAKE = "/dev/cpu_dma_latency"
+"""Takes the latency [us] with which a core may wake up, for as long as it is open."""
 
 
 def harden(priority: int) -> list[str]:
@@ -19,18 +23,13 @@ def harden(priority: int) -> list[str]:
     with suppress(OSError, AttributeError):
         if ctypes.CDLL(None).mlockall(_ALL) == 0:
             done.append("memory locked")
+    with suppress(OSError):  # open as long as the process lives
+        os.write(os.open(_AWAKE, os.O_WRONLY), struct.pack("i", 0))
+        done.append("cores kept awake")
     with suppress(OSError, AttributeError):  # AttributeError: not on this system
+        if not priority:
+            os.nice(-15)
+            return [*done, "a high priority"]
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
         done.append("SCHED_FIFO")
-    with suppress(OSError, AttributeError):
-        done += _place(priority == GUARD)
     return done
-
-
-def _place(guard: bool) -> list[str]:
-    """The last core is the guard's: Linux stops processes of SCHED_FIFO for 50 ms where they take 95 % of a core."""
-    cores = sorted(os.sched_getaffinity(0))
-    if len(cores) < 2:
-        return []
-    os.sched_setaffinity(0, cores[-1:] if guard else cores[:-1])
-    return ["a core without policy and robot"] if guard else []

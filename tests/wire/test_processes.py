@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -174,14 +175,19 @@ def test_the_policys_process_answers_the_newest_question_and_ends_with_its_guard
     assert [decode_answer(message, 3).tick for message in packets.received(ours)] == [2]
 
 
-def test_the_last_core_is_the_guards_where_there_are_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    placed = list[list[int]]()
-    monkeypatch.setattr(os, "sched_setaffinity", lambda pid, cores: placed.append(list(cores)), raising=False)
-    for cores in ({0, 1, 5}, {3}):
-        monkeypatch.setattr(os, "sched_getaffinity", lambda pid, cores=cores: cores, raising=False)
-        for guard in (True, False):
-            realtime._place(guard)
-    assert placed == [[5], [0, 1]]
+def test_the_guard_comes_first_the_policy_second_and_the_robot_takes_no_core(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked = list[object]()
+    monkeypatch.setattr(realtime.ctypes, "CDLL", lambda name: SimpleNamespace(mlockall=lambda which: 1))
+    monkeypatch.setattr(os, "sched_setscheduler", lambda pid, kind, param: asked.append(param.sched_priority))
+    monkeypatch.setattr(os, "nice", lambda step: asked.append(f"nice {step}"))
+    monkeypatch.setattr(realtime, "_AWAKE", str(tmp_path / "latency"))
+    (tmp_path / "latency").touch()
+    monkeypatch.setattr(realtime, "gc", SimpleNamespace(collect=int, freeze=int, disable=int))
+    for priority in (realtime.GUARD, realtime.POLICY, realtime.ROBOT):
+        realtime.harden(priority)
+    assert asked == [60, 50, "nice -15"] and (tmp_path / "latency").read_bytes() == bytes(4)
 
 
 def test_the_brain_that_is_kept_warm_answers_the_last_question_again_and_nobody_hears_it() -> None:
