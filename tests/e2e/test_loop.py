@@ -33,6 +33,7 @@ pytestmark = pytest.mark.e2e
 LIMIT = 600  # [s] for any one command
 ITERATIONS = 60  # of the base policy
 FEW = {"env": {"num_worlds": 8}}
+WINDOWS = {"max_windows": 12, "max_holdout_windows": 8, "report_windows": 8}
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
         "base": {**FEW, "ppo": {"iterations": ITERATIONS}},  # long enough for the kill to come before its end
         **dict.fromkeys(("experts", "refine", "distill"), FEW),
         # Time for the first effect: the whole search takes half a minute or several, by what was sealed and measured.
-        "diagnose": {"search_seconds": 5.0, "beyond_seconds": 1.0},
+        "diagnose": {"search_seconds": 5.0, "beyond_seconds": 1.0, **WINDOWS},
         "control": {"kinds": ["delta"]},  # all that the other kind does, and more
     }
     folder = workspaces.create(tmp_path_factory.mktemp("e2e") / "smoke", "smoke", **over)

@@ -28,11 +28,16 @@ def learned(folder: Path) -> list[dict[str, Any]]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of two processes that trained to the end."""
-    folder = tmp_path_factory.mktemp("whole")
-    assert launch(2, [*PROCESS, str(folder)]) == 0
-    return folder
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Folders of two processes that trained to the end, and then once more until one of them died."""
+    whole, broken = (tmp_path_factory.mktemp(name) for name in ("whole", "broken"))
+    assert launch(2, [*PROCESS, str(whole), f"{broken}:2"]) == 7
+    return whole, broken
+
+
+@pytest.fixture(scope="module")
+def whole(both: tuple[Path, Path]) -> Path:
+    return both[0]
 
 
 def test_both_processes_learn_one_policy_from_worlds_of_their_own(whole: Path) -> None:
@@ -50,7 +55,7 @@ def test_both_processes_learn_one_policy_from_worlds_of_their_own(whole: Path) -
 @pytest.mark.slow
 def test_the_captured_update_learns_one_policy_too(whole: Path, tmp_path: Path) -> None:
     """Equal to the bit on both; and not by chance what rsl_rl's update learns, which draws other noise."""
-    assert launch(2, [*PROCESS, str(tmp_path), "captured"]) == 0
+    assert launch(2, [*PROCESS, f"{tmp_path}:captured"]) == 0
     first, second = learned(tmp_path)
     for name, value in first["state"].items():
         assert torch.equal(value, second["state"][name]), name
@@ -68,18 +73,18 @@ def test_the_normalisation_has_seen_the_frames_of_all(whole: Path) -> None:
     assert curve["frames"].tolist() == [frames // 3, 2 * frames // 3, frames]
 
 
-def test_it_goes_on_where_it_was_when_one_process_died(whole: Path, tmp_path: Path) -> None:
+def test_it_goes_on_where_it_was_when_one_process_died(both: tuple[Path, Path]) -> None:
     """The other is ended, the checkpoint of iteration 2 is continued, and the end is that of an unbroken training."""
-    assert launch(2, [*PROCESS, str(tmp_path), "2"]) == 7
-    assert (tmp_path / CHECKPOINT).exists() and not (tmp_path / "0.pt").exists()
-    assert launch(2, [*PROCESS, str(tmp_path)]) == 0
-    again, unbroken = learned(tmp_path), learned(whole)
+    whole, broken = both
+    assert (broken / CHECKPOINT).exists() and not (broken / "0.pt").exists()
+    assert launch(2, [*PROCESS, str(broken)]) == 0
+    again, unbroken = learned(broken), learned(whole)
     assert [one["began"] for one in again] == [2, 2]
     for name, value in unbroken[0]["state"].items():
         assert torch.equal(value, again[0]["state"][name]), name
     for a, b in zip(again, unbroken, strict=True):
         assert torch.equal(a["frame"], b["frame"])
-    curves = [pd.read_csv(folder / CURVE).drop(columns="seconds") for folder in (whole, tmp_path)]
+    curves = [pd.read_csv(folder / CURVE).drop(columns="seconds") for folder in (whole, broken)]
     pd.testing.assert_frame_equal(*curves)
 
 

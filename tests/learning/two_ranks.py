@@ -1,6 +1,6 @@
 """One of the processes of `test_ranks`: trains a little, then writes what it knows into a folder of the test.
 
-python -m tests.learning.two_ranks FOLDER [ITERATION AT WHICH THE SECOND RANK DIES | captured]
+python -m tests.learning.two_ranks FOLDER[:ITERATION AT WHICH THE SECOND RANK DIES | :captured] ...
 """
 
 import sys
@@ -11,7 +11,7 @@ import torch
 
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ppo import Trainer
-from bumblebee.learning.ranks import join, leave
+from bumblebee.learning.ranks import Ranks, join, leave
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
@@ -22,10 +22,8 @@ from tests.tracking.clips import waving
 CONFIG = PpoConfig(iterations=3, steps=4, epochs=2, mini_batches=2, hidden=(16, 16), checkpoint_every=2)
 
 
-def main(folder: Path, dies_at: int | None, captured: bool) -> None:
+def train(folder: Path, ranks: Ranks, dies_at: int | None = None, captured: bool = False) -> None:
     """Train to the end, or die."""
-    torch.set_num_threads(1)
-    ranks = join(on_gpu=False)
     config = EnvConfig(num_worlds=8, threads=1, physics_hz=100)
     library = MotionLibrary([waving("a", 50), waving("b", 70)], config.ahead)
     engine = MujocoCpu(load_model(physics_hz=100), config.num_worlds, threads=1)
@@ -46,9 +44,12 @@ def main(folder: Path, dies_at: int | None, captured: bool) -> None:
     torch.save(
         learned | {"frame": env._frame, "mass": engine.batch.expand("body_mass")[:, 1]}, folder / f"{ranks.rank}.pt"
     )
-    leave()
 
 
 if __name__ == "__main__":
-    also = sys.argv[2] if len(sys.argv) > 2 else ""
-    main(Path(sys.argv[1]), int(also) if also.isdigit() else None, also == "captured")
+    torch.set_num_threads(1)
+    own = join(on_gpu=False)
+    for word in sys.argv[1:]:
+        place, _, also = word.partition(":")
+        train(Path(place), own, int(also) if also.isdigit() else None, also == "captured")
+    leave()

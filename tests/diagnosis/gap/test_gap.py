@@ -1,6 +1,8 @@
 """The gap report: a complete model lacks nothing, a lacking one what it lacks; what could not be tested is said."""
 
+import copy
 from dataclasses import fields, replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -8,7 +10,7 @@ import pytest
 from bumblebee.diagnosis import gap as room
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.gap import gap, gap_page
+from bumblebee.diagnosis.gap import Gap, gap, gap_page
 from bumblebee.diagnosis.report import gap_summary
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.gap import GapPage, GapThresholds
@@ -18,6 +20,7 @@ from tests.diagnosis import arm, cart
 from tests.diagnosis.arm import SMALL, session_of
 from tests.test_cli_diagnosis import run
 
+SPRING = ("spring", "j2", 1.5)
 COUNT = 4
 """Rollouts of a case: two to fit at least, and some that take no part."""
 
@@ -26,24 +29,30 @@ def of(effects: dict[tuple[str, str], float], seed: int = 0, **given) -> Session
     return session_of(arm.simulate(effects, count=COUNT, seed=seed, **given))
 
 
+@cache
+def reported(seed: int, *effects: tuple[str, str, float]) -> Gap:
+    """The report of such rollouts, made once."""
+    return gap(of({(kind, place): value for kind, place, value in effects}, seed), 20, SMALL)
+
+
 def by(thresholds: Thresholds) -> DiagnosisConfig:
     return replace(SMALL, thresholds=thresholds)
 
 
-def named(session: Session) -> dict[str, list[str]]:
+def named(report: Gap) -> dict[str, list[str]]:
     """Joint that lacks a torque -> what that depends on."""
-    entries = gap(session, 20, SMALL).document["missing_torque"]
+    entries = report.document["missing_torque"]
     return {joint: e["depends_on"] for joint, e in entries.items() if e["significant"]}
 
 
 @pytest.fixture(scope="module")
 def session() -> Session:
-    return of({("spring", "j2"): 1.5})
+    return of({SPRING[:2]: SPRING[2]})
 
 
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))])
 def test_nothing_depends_on_anything_where_the_model_is_complete(seed: int) -> None:
-    assert named(of({}, seed)) == {}
+    assert named(reported(seed)) == {}
 
 
 @pytest.mark.parametrize(
@@ -51,24 +60,21 @@ def test_nothing_depends_on_anything_where_the_model_is_complete(seed: int) -> N
     [
         (("coulomb_friction", "j2", 0.5), "j2", "velocity"),
         (("viscous_friction", "j3", 0.3), "j3", "velocity"),
-        (("spring", "j2", 1.5), "j2", "position"),
+        (SPRING, "j2", "position"),
         (("motor_strength", "j2", 0.8), "j2", "torque"),
     ],
 )
 def test_what_a_joint_lacks_is_named_with_what_it_depends_on(effect, joint: str, quantity: str) -> None:
-    kind, place, value = effect
-    found = named(of({(kind, place): value}))
-    assert quantity in found[joint]
+    assert quantity in named(reported(0, effect))[joint]
 
 
 @pytest.mark.parametrize("effect", [("torque_limit", "j2", 6.0), ("motor_strength", "j2", 0.8)])
 def test_the_joint_that_is_wrong_stands_first_however_wrong_it_is(effect) -> None:
-    kind, place, value = effect
-    assert next(iter(named(of({(kind, place): value}, 3)))) == "j2"
+    assert next(iter(named(reported(3, effect)))) == "j2"
 
 
 def test_the_missing_torque_is_as_large_as_the_friction_that_the_model_lacks() -> None:
-    entry = gap(of({("coulomb_friction", "j2"): 0.5}), 20, SMALL).document["missing_torque"]["j2"]
+    entry = reported(0, ("coulomb_friction", "j2", 0.5)).document["missing_torque"]["j2"]
     assert 0.3 < entry["structured_rms"] < 0.6
 
 
@@ -85,8 +91,8 @@ def test_logs_without_a_stretch_of_a_windows_length_get_a_report_without_missing
     assert "Too few windows" in gap_page(made)
 
 
-def test_a_trace_is_not_called_nothing(session: Session) -> None:
-    report = gap(session, 20, SMALL)
+def test_a_trace_is_not_called_nothing() -> None:
+    report = replace(reported(0, SPRING), document=copy.deepcopy(reported(0, SPRING).document))
     entry = report.document["missing_torque"]["j3"]
     entry |= {"significant": False, "p": 1e-9}
     assert "too small or not confirmed" in gap_page(report)
@@ -95,7 +101,7 @@ def test_a_trace_is_not_called_nothing(session: Session) -> None:
 
 
 def test_its_thresholds_are_settable(session: Session) -> None:
-    before, rules = gap(session, 20, SMALL), Thresholds()
+    before, rules = reported(0, SPRING), Thresholds()
     assert before.document["missing_torque"]["j2"]["significant"]
     tests = replace(rules.discrepancy.residual_tests, least_torque=1e9, excess_fitted=1e9, excess_alone=1e9)
     strict = replace(rules, discrepancy=replace(rules.discrepancy, residual_tests=tests))

@@ -9,7 +9,6 @@ from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.prepare import gather
 from bumblebee.diagnosis.residuals.problem import window_weights
 from bumblebee.diagnosis.selection import confounding
-from bumblebee.diagnosis.selection.forward import begin
 from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.swap import swap
@@ -22,10 +21,11 @@ from tests.diagnosis.test_catalogue import CONFIG
 
 
 def begun(xml: str, rollouts: list[Rollout], chosen: dict[tuple[str, str], float | tuple[float, ...]]) -> SearchState:
-    """A search that has found some effects, fitted from some values."""
+    """A search that has found some effects, fitted from some values; that its servos may be far off is not asked."""
     session = arm.session_of(rollouts, xml)
     material = gather(session, CONFIG, np.random.default_rng(0), lambda text: None)
-    run = begin(material.problem, material.holdout, material.remade, CONFIG.search, lambda text: None)
+    run = SearchState(material.problem, material.holdout, material.remade, CONFIG.search, lambda text: None)
+    run.open()
     names = [next(c for c in run.candidates if (c.effect, c.where) == key) for key in chosen]
     values = np.concatenate([np.empty(0), *(np.atleast_1d(v) for v in chosen.values())])
     fit = gauss_newton(run.problem, names, values, run.weights)

@@ -1,6 +1,7 @@
 """A motor's cogging behind a gear, of any number of periods in a turn of the joint, by slow logs and by fast ones."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.selection.proposals.torque_ripple import KIND, promising, ripple_trials
+from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
@@ -61,9 +63,15 @@ def test_a_geared_motor_that_does_not_cog_lacks_nothing() -> None:
     assert found([turned(0.0, 50, seed) for seed in range(4)])["effects"] == []
 
 
+@cache
+def cogging(periods: float) -> SearchState:
+    """A search at its beginning on an arm that cogs; who asks its joints clears what was asked."""
+    return begun(arm.XML, simulate({("cogging", "j1"): (0.3, 0.2, periods)}, seed=5), {})
+
+
 @pytest.mark.parametrize("periods", [60.5, 151.3])
 def test_the_highest_peak_of_the_joint_that_cogs_is_there_and_no_other_joint_has_one(periods: float) -> None:
-    run = begun(arm.XML, simulate({("cogging", "j1"): (0.3, 0.2, periods)}, seed=5), {})
+    run = cogging(periods)
     like = {c.where: c for c in run.candidates if c.effect == KIND}
     (best, steps, _), *_ = promising(run, like["j1"])
     assert best.step[2] == pytest.approx(periods, abs=0.5)
@@ -72,14 +80,16 @@ def test_the_highest_peak_of_the_joint_that_cogs_is_there_and_no_other_joint_has
 
 
 def test_a_joint_is_asked_once_and_one_that_is_not_off_never() -> None:
-    run = begun(arm.XML, simulate({("cogging", "j1"): (0.3, 0.2, 151.3)}, seed=5), {})
+    run = cogging(151.3)
+    run.hopeless.clear()
     assert [t.candidate.where for t in ripple_trials(run)] == ["j1"]
     assert ripple_trials(run) == []
     assert ripple_trials(begun(arm.XML, simulate({}, seed=5), {})) == []
 
 
 def test_a_ripple_that_is_faint_beside_what_was_tried_waits() -> None:
-    run = begun(arm.XML, simulate({("cogging", "j1"): (0.3, 0.2, 151.3)}, seed=5), {})
+    run = cogging(151.3)
+    run.hopeless.clear()
     (trial,) = ripple_trials(run)
     run.hopeless.clear()
     much = replace(trial, cost=run.fit.cost - 100.0 * (run.fit.cost - trial.cost))
