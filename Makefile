@@ -51,6 +51,7 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 	$(BIN)/python -m pip install -q --no-compile $(PIP_OPTIONS) $(TORCH)  # adds what a CUDA build needs beside, nothing to others
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
 	@# On all cores, as pip does on one, but for what is hardly ever imported; templates may not compile.
+	@echo "make setup: compiling"
 	@$(BIN)/python -m compileall -qq -j 0 -x '/tests/|/transformers/models/' $(VENV)/lib bumblebee tasks flows || true
 	$(BIN)/python -m tasks.private
 	@touch $@

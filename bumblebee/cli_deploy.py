@@ -1,5 +1,6 @@
 """Command line: `bumblebee deploy sheet`, `run`, `robot`, `rollouts`."""
 
+import difflib
 import getpass
 import sys
 import tempfile
@@ -141,6 +142,7 @@ def run(
     if ended.reason:
         print(f"stopped by the rule {ended.reason}")
         raise typer.Exit(STOPPED)
+    print("ended in good order")
 
 
 def _say(line: str) -> None:
@@ -249,5 +251,6 @@ def _clips(motions: str, names: Sequence[str]) -> "list[Clip]":
         made = {clip.name: partial(lambda clip: clip, clip) for clip in read_folder(Path(motions), ReadConfig()).clips}
     for name in names:
         if name not in made:
-            raise BadInput("--clip", f"one of {', '.join(made)}"[:1000], repr(name)[:60])
+            near = difflib.get_close_matches(name, made, 3) or list(made)[:3]
+            raise BadInput("--clip", f"one of {len(made)} motions", repr(name)[:60], f"Such as {', '.join(near)}.")
     return [made[name]() for name in names or made]

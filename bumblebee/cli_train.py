@@ -32,8 +32,8 @@ def train(
     """Train a policy on a folder of motions. Stopped, the same command goes on from its last checkpoint."""
     from dataclasses import asdict
 
-    from bumblebee.api.policy_card import tried
-    from bumblebee.api.training import TrainConfig
+    from bumblebee.api.policy_card import splits, tried
+    from bumblebee.api.training import TrainConfig, parent_of
     from bumblebee.api.training import train as fit
     from bumblebee.io.write import refuse_overlap
     from bumblebee.motion.cache import user_cache
@@ -59,7 +59,7 @@ def train(
     made = fit(reading.clips, out, overwrite=overwrite, say=say, **asdict(config))
     for told in few_lines(zip(made.dropped["motion"], made.dropped["explanation"], strict=True)):
         print(plain(f"dropped: {told.line}: {told.whose}"))
-    print("\n".join(line for line in tried(made.trials) if line))
+    print("\n".join(line for line in tried(made.trials, splits(parent_of(config.start))) if line))
     print(f"written: {out}: policy.onnx, contract.json, README.md (the card), film.gif, policy.pt, trials.csv")
 
 

@@ -75,7 +75,7 @@ class _Bar(Progress):
         self.done += n
         elapsed = max(time.monotonic() - self._began, 1e-9)
         extra = f"{(self.done - self.start) / elapsed:,.1f} {self.unit}/s {note}"
-        self._bar.update(self._task, completed=int(self.done), extra=extra)
+        self._bar.update(self._task, total=self.total, completed=int(self.done), extra=extra)
 
     def close(self) -> None:
         self._bar.stop()

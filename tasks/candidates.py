@@ -98,10 +98,11 @@ def beside(cluster: str, number: int, parent: int, kinds: Sequence[str]) -> list
     return found
 
 
-def came_along(base: Path) -> bool:
-    """Whether the base policy began from the one that comes with BumbleBee."""
+def came_along(base: Path) -> Path | None:
+    """Folder of the policy that comes with BumbleBee and that the base policy began from, if it did."""
     card = base / "card.json"
-    return card.exists() and json.loads(card.read_text()).get("parent") in NAMES.values()
+    parent = json.loads(card.read_text()).get("parent") if card.exists() else None
+    return next((folder for folder, name in NAMES.items() if name == parent), None)
 
 
 def same(candidate: Candidate) -> tuple[str, str]:

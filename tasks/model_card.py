@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from bumblebee.deploy.card_text import card_text, made_from
+from bumblebee.learning.pretrained import MOTIONS, NAMES
 from bumblebee.motion.licence_terms import UNKNOWN, counted
 
 ROBOTS = {
@@ -30,7 +31,13 @@ class Evaluated:
 
 
 def model_card(
-    name: str, policy: str, folder: Path, parent: str | None, evaluated: Evaluated, licences: Mapping[str, int]
+    name: str,
+    policy: str,
+    folder: Path,
+    parent: str | None,
+    evaluated: Evaluated,
+    licences: Mapping[str, int],
+    shipped: Path | None = None,
 ) -> str:
     """The card, from contract.json and card.json of the policy's folder and its result.
 
@@ -41,9 +48,11 @@ def model_card(
         parent: name of the policy that it was trained from, None where there is none.
         evaluated: how it did.
         licences: licence -> number of motions, as `licences_of` has it.
+        shipped: the policy of BumbleBee's own that the loop went on from.
     """
     contract = json.loads((folder / "contract.json").read_text())
     card = json.loads((folder / "card.json").read_text()) if (folder / "card.json").exists() else {}
+    card |= {"learnt_before": [f"`{NAMES[shipped]}`: {MOTIONS[shipped]}"]} if shipped else {}
     lineage = "- every input with its hash: `lineage.json` beside this card"
     made = [*made_from(card, parent, licences), lineage]
     return card_text(f"{name}: {policy}", contract, {"Evaluated": _evaluated(evaluated)}, made)

@@ -15,6 +15,7 @@ from bumblebee.evaluation.summary import compare
 from bumblebee.measured import gate, gate_words
 from bumblebee.ranges import Ranged
 from tasks import paths, registry
+from tasks.candidates import came_along
 from tasks.lineage import path_hash
 from tasks.model_card import Evaluated, licences_of, model_card
 from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
@@ -211,7 +212,8 @@ def publish(
     tags |= {name: f"{value:.6g}" for name, value in metrics.items() if value is not None}
     evaluated = Evaluated(standard.contract, standard.engine, result)
     licences = licences_of(paths.FILTERED)
-    card = model_card(candidate.model, candidate.policy, candidate.folder, candidate.parent, evaluated, licences)
+    began = came_along(paths.BASE)
+    card = model_card(candidate.model, candidate.policy, candidate.folder, candidate.parent, evaluated, licences, began)
     version = registry.register(candidate.model, candidate.folder, tags, metrics, card)
     if verdict.promoted and not standard.asks:
         registry.set_alias(candidate.model, CHAMPION, version)

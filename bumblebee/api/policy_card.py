@@ -1,18 +1,24 @@
 """Card of a policy that `train` wrote: facts for programs (card.json) and for people (README.md)."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from bumblebee.api.training import CARD
 from bumblebee.deploy.card_text import card_text, made_from
 from bumblebee.evaluation.intervals import mean_by_motion, success_rate
+from bumblebee.io.read import read_json
+from bumblebee.learning import pretrained
 from bumblebee.learning.trial import success_by_family
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.licence_terms import counted
 
 SPLITS = {"train": "trained on", "test": "held out"}
+GOES_ON = SPLITS | {"test": "held out here, though the policy that it goes on from may have learnt them"}
+"""The same for a training that goes on from a policy: only one from nothing has not seen what it holds out."""
 _WORST = 5  # motions named that the policy loses first
 
 
@@ -45,16 +51,35 @@ def card_of(
         "before": None if before is None else success_by_family(before),
         "trained": success_by_family(after),
         "kept": "parent" if parent_kept else "child",
+        "licences": counted(clip.licence for clip in clips if clip.split == "train"),
+        "learnt_before": [] if before is None else learnt_before(config["start"]),
         "config": config,
     }
 
 
-def readme(card: dict[str, Any], contract: dict[str, Any], trials: pd.DataFrame, clips: Sequence[Clip]) -> str:
+def learnt_before(start: str) -> list[str]:
+    """Motions that a policy to go on from has learnt from, and their licences; a line for it and each of its parents.
+
+    Args:
+        start: the name of a shipped policy, or a policy's folder.
+    """
+    if start in pretrained.SHIPPED:
+        return [f"`{start}`: {pretrained.MOTIONS[pretrained.SHIPPED[start]]}"]
+    file = Path(start).expanduser() / CARD
+    card = read_json(file) if file.exists() else {}
+    licences = ", ".join(f"{licence} ({count})" for licence, count in card.get("licences", {}).items())
+    return [*card.get("learnt_before", []), f"`{start}`: {licences or 'licences unknown, see its card'}"]
+
+
+def readme(card: dict[str, Any], contract: dict[str, Any], trials: pd.DataFrame) -> str:
     """The card as Markdown; `trials` are those of the policy that was kept."""
-    licences = counted(clip.licence for clip in clips if clip.split == "train")
-    return card_text(
-        "A policy of `bumblebee train`", contract, {"Tried": tried(trials)}, made_from(card, card["parent"], licences)
-    )
+    how = {"Tried": tried(trials, splits(card["parent"]))}
+    return card_text("A policy of `bumblebee train`", contract, how, made_from(card, card["parent"], card["licences"]))
+
+
+def splits(start: str | Path | None) -> dict[str, str]:
+    """Words for the motions of each split; `start` is the policy that the training goes on from."""
+    return GOES_ON if start else SPLITS
 
 
 def tried(trials: pd.DataFrame, splits: Mapping[str, str] = SPLITS, noise: float = 0.0) -> Iterator[str]:

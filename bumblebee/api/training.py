@@ -155,21 +155,26 @@ def train_for(learner: "Learner", seconds: float) -> None:
     """
     begin, marks = learner.iteration, []
 
-    def measured() -> bool:
-        marks.append((learner.iteration, learner._seconds))
-        return learner.iteration >= begin + _FIRST or learner._seconds >= seconds
-
-    def enough() -> bool:
+    def aim(since: tuple[int, float]) -> None:
         each = (learner._seconds - since[1]) / (learner.iteration - since[0])
         left = max(round((seconds - learner._seconds) / each), 1)
         learner.config = replace(learner.config, iterations=learner.iteration + left)
+
+    def measured() -> bool:
+        marks.append((learner.iteration, learner._seconds))
+        if len(marks) > 1:
+            aim(marks[-2])
+        return learner.iteration >= begin + _FIRST or learner._seconds >= seconds
+
+    def enough() -> bool:
+        aim(since)
         return learner._seconds >= seconds
 
     learner.config = replace(learner.config, iterations=begin + 100 * _FIRST)
     learner.train("speed", measured)
     since = marks[-2:][0]
     while learner._seconds < seconds:  # once, unless it grows faster than it was measured
-        enough()
+        aim(since)
         learner.train("policy", enough)
     learner.save_checkpoint()
 
@@ -223,7 +228,7 @@ def _kept(
         kept.to_csv(folder / "trials.csv", index=False)
         (folder / CARD).write_text(json.dumps(card, indent=1) + "\n")
         contract = json.loads((folder / CONTRACT).read_text())
-        (folder / "README.md").write_text(readme(card, contract, kept, clips))
+        (folder / "README.md").write_text(readme(card, contract, kept))
         write_pictures(folder / "film.gif", follow(policy, shown))
     return Trained(out, policy, kept, dropped)
 

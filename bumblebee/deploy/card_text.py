@@ -61,7 +61,7 @@ def _gives(contract: dict[str, Any]) -> Iterator[str]:
 
 
 def made_from(card: Mapping[str, Any], parent: str | None, licences: Mapping[str, int]) -> Iterator[str]:
-    """Lines on parent, stage, training, seed and licences of the motions."""
+    """Lines on parent, stage, training, seed and licences of the motions, those of its parents too."""
     origin = parent or ", ".join(card.get("from", [])) or card.get("config", {}).get("init")
     yield f"- from: {origin or 'not said'}"
     if "stage" in card:
@@ -78,6 +78,7 @@ def made_from(card: Mapping[str, Any], parent: str | None, licences: Mapping[str
     yield f"- seed: {seed}" if seed is not None else "- seed: not said"
     named = ", ".join(f"{licence} ({count})" for licence, count in licences.items())
     yield f"- licences of the motions: {named or UNKNOWN}"
+    yield from (f"- its weights have also learnt from {line}" for line in card.get("learnt_before", []))
     yield from (f"- **{line}**" for line in restrictions(licences))
 
 

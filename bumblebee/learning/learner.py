@@ -5,6 +5,7 @@ whoever trains by one of them knows this interface alone (`learners.make_learner
 """
 
 import contextlib
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -155,7 +156,9 @@ class Learner(ABC):
                 for name, value in row.items():
                     curve.add_scalar(name, value, self.iteration)
                 curve.flush()
-                bar.update(frames, f"success {row['success']:.2f}, key error {row['key_error']:.3f} m")
+                bar.total = self.frames + self._coming()  # a training for so long learns how many iterations these are
+                known = f"success {row['success']:.2f}, " if math.isfinite(row["success"]) else ""
+                bar.update(frames, f"{known}key error {row['key_error']:.3f} m")
 
             yield tell
         curve.stop()

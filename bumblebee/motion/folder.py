@@ -158,8 +158,9 @@ def _nothing(path: Path, heard: _Heard) -> BadInput:
     if not path.is_dir() and len(heard.skipped) == 1:
         expected, known, came = heard.skipped[0][1].removeprefix("expected ").partition(", came ")
         return BadInput(path, expected, came) if known else BadInput(path, "motions that can be read", expected)
+    do = "" if heard.skipped else "docs/data.md has the formats that are read."
     first = f"; the first: {heard.skipped[0][0]}: {heard.skipped[0][1]}" if heard.skipped else ""
-    return BadInput(path, "motions that can be read", f"{heard.files} files, none of them usable{first}")
+    return BadInput(path, "motions that can be read", f"{heard.files} files, none of them usable{first}", do)
 
 
 def skipped_table(rows: list[tuple[str, str]]) -> pd.DataFrame:

@@ -20,6 +20,7 @@ from bumblebee.motion.store import Library
 from bumblebee.motion.texts import shown
 
 Motion = RawMotion | HumanMotion | Clip
+_DO = "docs/data.md has the formats that are read."
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def find_motions(path: Path, config: FileConfig | None = None) -> Iterator[Found
     path, config = Path(path), config or FileConfig()
     config.require_skeleton()
     if not os.path.lexists(path):
-        raise BadInput(path, "a motion file, or a folder that holds some", "no such file or folder")
+        raise BadInput(path, "a motion file, or a folder that holds some", "no such file or folder", _DO)
     nothing = True
     for source in walk.motion_sources(path):
         if source.path.name == LICENCES:
@@ -67,7 +68,7 @@ def find_motions(path: Path, config: FileConfig | None = None) -> Iterator[Found
         else:
             yield _file(source, config)
     if nothing:
-        raise BadInput(path, "a motion file, or a folder that holds some", "none")
+        raise BadInput(path, "a motion file, or a folder that holds some", "none", _DO)
 
 
 def _file(source: Source, config: FileConfig) -> Found:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.errors import BadInput
 from bumblebee.learning.export import export_shipped
 from bumblebee.learning.pretrained import SHIPPED
 from bumblebee.motion.embedded import EmbeddedConfig, make
@@ -25,10 +26,17 @@ def shipped_policy() -> Iterator[ExportedPolicy]:
 
 @contextmanager
 def at_hand(path: Path) -> Iterator[Path]:
-    """The path, or for the name of a policy that comes along its folder as it is deployed, which is gone afterwards."""
-    if str(path) not in SHIPPED or path.exists():
+    """The path, or for the name of a policy that comes along its folder as it is deployed, which is gone afterwards.
+
+    Raises:
+        BadInput: nothing lies there, and no policy has the name.
+    """
+    if path.exists():
         yield path
         return
+    if str(path) not in SHIPPED:
+        expected = f"a path, or a policy that comes along: {', '.join(SHIPPED)}"
+        raise BadInput(path, expected, "no such file or folder", "docs/viewing.md says what can be seen.")
     with tempfile.TemporaryDirectory() as folder:
         yield export_shipped(Path(folder) / path, str(path))
 

@@ -13,7 +13,7 @@ import pytest
 
 import bumblebee as bb
 from bumblebee.api import training
-from bumblebee.api.policy_card import tried
+from bumblebee.api.policy_card import learnt_before, splits, tried
 from bumblebee.api.recipes import as_seen_by
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.tracking.config import EnvConfig
@@ -104,6 +104,16 @@ def test_a_child_sees_what_its_parent_sees_and_is_compared_where_it_can_know_it_
     here, there = (as_seen_by(EnvConfig(), bb.load_policy(name).shape) for name in ("shipped", "imu"))
     assert here == EnvConfig()
     assert there.observation.terms == ("imu",) and there.ahead == (0.1, 0.3, 0.6, 1.0) and there.place == "own"
+
+
+def test_a_child_names_the_licences_of_all_its_parents_and_calls_nothing_unseen(tmp_path):
+    own, child = learnt_before("shipped"), tmp_path / "policy"
+    assert "CC BY 4.0" in own[0] and "MIT" in own[0]
+    child.mkdir()
+    (child / "card.json").write_text(json.dumps({"licences": {"CC-BY-NC-4.0": 3}, "learnt_before": own}))
+    assert learnt_before(str(child)) == [*own, f"`{child}`: CC-BY-NC-4.0 (3)"]
+    assert "licences unknown" in learnt_before(str(tmp_path))[0]
+    assert splits(None)["test"] == "held out" and "may have learnt them" in splits(child)["test"]
 
 
 def test_an_evaluation_says_how_much_noise_there_was():

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from bumblebee.deploy.describe import MEANINGS, meaning
+from bumblebee.learning.pretrained import MOTIONS, NAMES
 from bumblebee.tracking.terms import LAYOUTS, SETS, TERMS
 from tasks.model_card import Evaluated, licences_of, model_card
 from tasks.run_form import fitted
@@ -63,6 +64,13 @@ def test_the_card_says_what_it_takes_gives_and_is_worth(policy_folder) -> None: 
 def test_what_is_not_known_is_said_to_be_so(policy_folder, tmp_path: Path) -> None:  # noqa: F811
     card = model_card("base", "base", policy_folder(), None, Evaluated("b", "nominal", RESULT), licences_of(tmp_path))
     assert "- from: not said" in card and "- seed: not said" in card and "- licences of the motions: unknown" in card
+
+
+def test_a_card_names_what_the_shipped_weights_have_learnt_from(policy_folder) -> None:  # noqa: F811
+    for shipped in MOTIONS:
+        card = model_card("base", "base", policy_folder(), None, Evaluated("b", "nominal", RESULT), {"MIT": 2}, shipped)
+        assert f"- its weights have also learnt from `{NAMES[shipped]}`: {MOTIONS[shipped]}" in card and "CC BY" in card
+        assert len(card) <= 5000, "MLflow's tables hold no more"
 
 
 def test_licences_are_counted(tmp_path: Path) -> None:

@@ -10,5 +10,9 @@ IMU = FOLDER / "imu"
 """A third one: it learnt on such robots too, and sees what an IMU and encoders give, without odometry."""
 NAMES = {FOLDER: "pretrained", RANDOMISED: "pretrained-randomised", IMU: "pretrained-imu"}
 """Names of the parents that a policy began from, on its card."""
+_REAL = 'G1 Moves (CC BY 4.0, attribution: "G1 Moves, Experiential Technologies"), ASAP (MIT)'
+_CMU = "CMU's motion capture database (free to use; mocap.cs.cmu.edu, funded by NSF EIA-0196217)"
+MOTIONS = {FOLDER: _REAL, RANDOMISED: f"{_REAL}, {_CMU}", IMU: f"{_REAL}, {_CMU}"}
+"""Real motions that each has learnt from, with licences that whatever goes on from its weights keeps."""
 SHIPPED = {"shipped": FOLDER, "randomised": RANDOMISED, "imu": IMU}
 """Names by which a user asks for them."""
