@@ -1,6 +1,5 @@
 """Which policies are evaluated, which of them are one and the same, and what is compared with what."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -12,8 +11,8 @@ from bumblebee.deploy.policy import read_policy_contract
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.learning.export import export_shipped
-from bumblebee.learning.pretrained import NAMES
 from tasks import paths
+from tasks.came_along import came_along
 from tasks.control_config import ControlConfig
 from tasks.params import load, read
 
@@ -96,13 +95,6 @@ def beside(cluster: str, number: int, parent: int, kinds: Sequence[str]) -> list
         name = f"{before.policy}-compensated"
         found.insert(0, replace(before, policy=name, kind="compensated", compensation=undone))
     return found
-
-
-def came_along(base: Path) -> Path | None:
-    """Folder of the policy that comes with BumbleBee and that the base policy began from, if it did."""
-    card = base / "card.json"
-    parent = json.loads(card.read_text()).get("parent") if card.exists() else None
-    return next((folder for folder, name in NAMES.items() if name == parent), None)
 
 
 def same(candidate: Candidate) -> tuple[str, str]:

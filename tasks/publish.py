@@ -15,7 +15,7 @@ from bumblebee.evaluation.summary import compare
 from bumblebee.measured import gate, gate_words
 from bumblebee.ranges import Ranged
 from tasks import paths, registry
-from tasks.candidates import came_along
+from tasks.came_along import came_along
 from tasks.lineage import path_hash
 from tasks.model_card import Evaluated, licences_of, model_card
 from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both, unchanged

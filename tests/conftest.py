@@ -28,5 +28,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What was imported stays to the end: the garbage collector need not look through it each time."""
+    """Keep the garbage collector from what was imported, which stays to the end."""
     gc.freeze()

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bumblebee.api.training import CARD
-from bumblebee.deploy.card_text import card_text, made_from
+from bumblebee.deploy.card_text import CARD, card_text, made_from
 from bumblebee.evaluation.intervals import mean_by_motion, success_rate
 from bumblebee.io.read import read_json
 from bumblebee.learning import pretrained
@@ -18,7 +17,7 @@ from bumblebee.motion.licence_terms import counted
 
 SPLITS = {"train": "trained on", "test": "held out"}
 GOES_ON = SPLITS | {"test": "held out here, though the policy that it goes on from may have learnt them"}
-"""The same for a training that goes on from a policy: only one from nothing has not seen what it holds out."""
+"""Words of a training that goes on from a policy: only one from nothing has not seen what it holds out."""
 _WORST = 5  # motions named that the policy loses first
 
 

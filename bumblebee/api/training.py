@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bumblebee.api import checks
+from bumblebee.deploy.card_text import CARD
 from bumblebee.errors import BadInput
 from bumblebee.io.write import new_folder, refuse_foreign, try_output
 from bumblebee.motion.clip import Clip
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from bumblebee.learning.policy import Policy
 
 NOTHING = "nothing"
-CARD = "card.json"
 _FIRST = 3  # iterations that measure the speed: the first of them loads kernels
 
 

@@ -7,6 +7,9 @@ from bumblebee.deploy.describe import action_sentence, joint_table, observation_
 from bumblebee.motion.licence_terms import UNKNOWN, restrictions
 from bumblebee.robot.facts import KEY_BODIES
 
+CARD = "card.json"
+"""File of a policy's folder: its card as plain data."""
+
 
 def card_text(title: str, contract: dict[str, Any], tried: Mapping[str, Iterable[str]], made: Iterable[str]) -> str:
     """A card: a sentence, how the policy was tried, limits, origin, observation and action.

@@ -16,7 +16,7 @@ from bumblebee.motion.store import write_library
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.sampler import ClipSampler
 from tasks import base, experts, params, refine, report, training
-from tasks.candidates import came_along
+from tasks.came_along import came_along
 from tasks.sections import Loop, Round
 from tests.tracking.clips import waving
 

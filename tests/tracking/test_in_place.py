@@ -1,4 +1,4 @@
-"""What a recording reads stays where it is; elsewhere new values replace old ones."""
+"""Tensors that a recording reads stay where they are; elsewhere new values replace old ones."""
 
 from dataclasses import dataclass
 

@@ -23,7 +23,7 @@ def test_what_cannot_be_run_is_one_line(capsys: pytest.CaptureFixture[str], tmp_
     out = tmp_path / "out"
     for words, expected in (
         (("run", "shipped", "--clip", "squat"), "a terminal, for the dead-man's key"),
-        (("run", "shipped", "--unattended", "--clip", "sqat"), "squat_quick"),
+        (("run", "shipped", "--unattended", "--clip", "sqat"), "Such as squat"),
         (("run", tmp_path, *ALONE), "contract.json"),
         (("run", "shipped", *ALONE, "--robot", "can"), "sim or lcm"),
         (("run", "shipped", *ALONE, "--limits", tmp_path / "no.yaml"), "no.yaml"),
