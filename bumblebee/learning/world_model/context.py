@@ -1,4 +1,4 @@
-"""Context that the model is told beside the state: a vector of what differs for each world, and how many targets act."""
+"""Context that the model is told beside the state: a vector of what differs for each world, and how far targets act."""
 
 from collections.abc import Mapping
 
