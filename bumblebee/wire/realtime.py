@@ -3,15 +3,11 @@
 import ctypes
 import gc
 import os
-import struct
 from contextlib import suppress
 
 _ALL = 3  # MCL_CURRENT | MCL_FUTURE
-GUARD, POLICY, ROBOT = 60, 50, 0
-"""Priorities of SCHED_FIFO: the guard comes before the policy. The simulated robot has none: it takes most of a core,
-and Linux stops those that have one for 50 ms once they have taken 95 % of it. It comes before ordinary programs."""
-_AWAKE = "/dev/cpu_dma_latency"
-"""Takes the latency [us] with which a core may wake up, for as long as it is open."""
+GUARD, POLICY, ROBOT = 60, 50, 40
+"""Priorities: the guard comes before those that it waits for."""
 
 
 def harden(priority: int) -> list[str]:
@@ -23,13 +19,7 @@ def harden(priority: int) -> list[str]:
     with suppress(OSError, AttributeError):
         if ctypes.CDLL(None).mlockall(_ALL) == 0:
             done.append("memory locked")
-    with suppress(OSError):  # open as long as the process lives
-        os.write(os.open(_AWAKE, os.O_WRONLY), struct.pack("i", 0))
-        done.append("cores kept awake")
     with suppress(OSError, AttributeError):  # AttributeError: not on this system
-        if not priority:
-            os.nice(-15)
-            return [*done, "a high priority"]
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
         done.append("SCHED_FIFO")
     return done
