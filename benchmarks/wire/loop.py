@@ -9,7 +9,7 @@ from bumblebee.measured.rollout import write_rollout
 from bumblebee.robot.facts import ROBOT, joint_names
 from bumblebee.robot.model import write_xml
 from bumblebee.wire.rollouts import latency, rollout_of
-from bumblebee.wire.stand_in import rehearsed
+from bumblebee.wire.stand_in import prepared, records_of
 
 MOTIONS = ["squat", "walk_slow", "reach_low_left", "march", "arm_circles", "kick_left"]
 SEALED = (("coulomb_friction", "left_knee_joint", 4.0), ("encoder_offset", "left_shoulder_pitch_joint", 0.1))
@@ -22,7 +22,8 @@ def run(options: argparse.Namespace) -> None:
         entry(KINDS[kind], Place(declared_g1(), where, DRAWN, 0.0, 0.0, 0.0), size) for kind, where, size in SEALED
     ]
     for seed, clip in enumerate(clips(options.motions or MOTIONS)):
-        done, rows = rehearsed(policy, clip, effects, options.seed + seed)
+        done = prepared(policy, clip, effects, options.seed + seed)
+        rows = records_of(done, done.entries())
         about = {"id": f"{clip.name}-{seed}", "joints": joint_names(), "control_hz": 50.0, "robot": ROBOT}
         rollout = rollout_of(
             about | {"motion": clip.name, "policy": {"name": "shipped", "sha256": policy.sha256}}, rows

@@ -29,11 +29,12 @@ from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import joint_names
 from bumblebee.tracking.terminations import Stop
 from bumblebee.wire.align import aligned
+from bumblebee.wire.journal import Entry
 from bumblebee.wire.limits import Limits
 from bumblebee.wire.phases import Phase
 from bumblebee.wire.rehearsal import Rehearsal
 from bumblebee.wire.rollouts import latency
-from bumblebee.wire.stand_in import prepared, records_of, rehearsed
+from bumblebee.wire.stand_in import prepared, records_of
 
 WAYS = ("stepped", "delayed", "let go", "tilt alone", "wire")
 PAIRS = (*pairwise(WAYS), ("stepped", "wire"), ("delayed", "wire"))
@@ -61,7 +62,9 @@ def compared(policy: ExportedPolicy, motions: Sequence[Clip], sealed: Path | Non
         late, reason = latency(records), run.guard.reason
         alone = reason  # the run is the same until a rule ends it
         if reason not in ("", "tilt"):
-            alone = rehearsed(policy, clip, effects, seed, TILT_ALONE)[0].guard.reason
+            with_tilt = prepared(policy, clip, effects, seed, TILT_ALONE)
+            followed(with_tilt)
+            alone = with_tilt.guard.reason
         rows.append((clip.name, not reason, reason, not alone, late.median if late else np.nan))
         print(
             f"{sealed or 'nothing sealed'}: {clip.name}: {reason or 'to the end'}, {alone or 'to the end'}", flush=True
@@ -78,13 +81,12 @@ def compared(policy: ExportedPolicy, motions: Sequence[Clip], sealed: Path | Non
 
 def followed(run: Rehearsal) -> tuple[np.ndarray, Start]:
     """A run's records, and the state in which the gantry let the robot go, or the last one."""
-    batch, entries, start = run.robot.robots.batch, [], None
+    batch, entries, start = run.robot.robots.batch, list[Entry](), None
     for entry in run.entries():
         entries.append(entry)
         if start is None and entry.tick.phase >= Phase.RUN:
             start = batch.bind("qpos")[0].copy(), batch.bind("qvel")[0].copy()
-    assert start is not None
-    return records_of(run, entries), start
+    return records_of(run, entries), start or (batch.bind("qpos")[0].copy(), batch.bind("qvel")[0].copy())
 
 
 def in_place(starts: Sequence[Start], clips: Sequence[Clip], *rest: object) -> Start:

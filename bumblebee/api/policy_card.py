@@ -1,5 +1,6 @@
 """Card of a policy that `train` wrote: facts for programs (card.json) and for people (README.md)."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bumblebee.deploy.card_text import CARD, card_text, made_from
+from bumblebee.deploy.card_text import CARD, NOTHING, card_text, made_from
+from bumblebee.errors import BadInput
 from bumblebee.evaluation.intervals import mean_by_motion, success_rate
 from bumblebee.io.read import read_json
 from bumblebee.learning import pretrained
@@ -28,6 +30,7 @@ def card_of(
     before: pd.DataFrame | None,
     after: pd.DataFrame,
     parent_kept: bool,
+    known: Sequence[str],
 ) -> dict[str, Any]:
     """Facts of a training as plain data.
 
@@ -38,6 +41,7 @@ def card_of(
         before: trials of the policy that it began from; None for nothing.
         after: trials of the trained policy.
         parent_kept: whether the policy that it began from was kept.
+        known: lines of `learnt_before`.
     """
     return {
         "schema": 1,
@@ -51,7 +55,7 @@ def card_of(
         "trained": success_by_family(after),
         "kept": "parent" if parent_kept else "child",
         "licences": counted(clip.licence for clip in clips if clip.split == "train"),
-        "learnt_before": [] if before is None else learnt_before(config["start"]),
+        "learnt_before": list(known),
         "config": config,
     }
 
@@ -60,14 +64,22 @@ def learnt_before(start: str) -> list[str]:
     """Motions that a policy to go on from has learnt from, and their licences; a line for it and each of its parents.
 
     Args:
-        start: the name of a shipped policy, or a policy's folder.
+        start: the name of a shipped policy, a policy's folder, or "nothing".
+
+    Raises:
+        BadInput: the folder's card.json is not one of a policy.
     """
+    if start == NOTHING:
+        return []
     if start in pretrained.SHIPPED:
         return [f"`{start}`: {pretrained.MOTIONS[pretrained.SHIPPED[start]]}"]
     file = Path(start).expanduser() / CARD
-    card = read_json(file) if file.exists() else {}
-    licences = ", ".join(f"{licence} ({count})" for licence, count in card.get("licences", {}).items())
-    return [*card.get("learnt_before", []), f"`{start}`: {licences or 'licences unknown, see its card'}"]
+    card = read_json(file) if os.path.lexists(file) else {}
+    licences, before = (card.get("licences", {}), card.get("learnt_before", [])) if isinstance(card, dict) else (0, 0)
+    if not isinstance(licences, dict) or not isinstance(before, list):
+        raise BadInput(file, "a policy's card", "other contents", "Restore it, or remove it.")
+    told = ", ".join(f"{licence} ({count})" for licence, count in licences.items())
+    return [*map(str, before), f"`{start}`: {told or 'licences unknown, see its card'}"]
 
 
 def readme(card: dict[str, Any], contract: dict[str, Any], trials: pd.DataFrame) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bumblebee.api import checks
-from bumblebee.deploy.card_text import CARD
+from bumblebee.deploy.card_text import CARD, NOTHING
 from bumblebee.errors import BadInput
 from bumblebee.io.write import new_folder, refuse_foreign, try_output
 from bumblebee.motion.clip import Clip
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from bumblebee.learning.learner import Learner
     from bumblebee.learning.policy import Policy
 
-NOTHING = "nothing"
 _FIRST = 3  # iterations that measure the speed: the first of them loads kernels
 
 
@@ -96,13 +95,14 @@ def train(
         >>> (made.folder / "policy.onnx").exists()
         True
     """
+    from bumblebee.api.policy_card import learnt_before
     from bumblebee.motion.filter import filter_clips
     from bumblebee.motion.pieces import hold_out
 
     config, out = _config(settings), Path(out).expanduser()
     refuse_foreign(out, lambda path: overwrite and (path / CARD).exists(), "with --overwrite a policy")
     try_output(out)
-    clips = checks.motions(motions)
+    known, clips = learnt_before(config.start), checks.motions(motions)
     kept, dropped = filter_clips(clips)
     if not kept:
         first = dropped.iloc[0]
@@ -115,7 +115,7 @@ def train(
         learner = make_learner(split, config, folder)
         train_for(learner, 60 * config.minutes)
         say(f"trained on {learner.frames:,} control steps; trying the policy on each motion")
-        return _kept(learner, split, config, out, dropped, say)
+        return _kept(learner, split, config, out, dropped, known, say)
 
 
 def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "Learner":
@@ -162,7 +162,7 @@ def train_for(learner: "Learner", seconds: float) -> None:
 
     def measured() -> bool:
         marks.append((learner.iteration, learner._seconds))
-        if len(marks) > 1:
+        if len(marks) > 2:  # the first interval has the loading of kernels in it
             aim(marks[-2])
         return learner.iteration >= begin + _FIRST or learner._seconds >= seconds
 
@@ -202,6 +202,7 @@ def _kept(
     config: TrainConfig,
     out: Path,
     dropped: "pd.DataFrame",
+    known: Sequence[str],
     say: Callable[[str], None],
 ) -> Trained:
     """Try the policy and the one it began from, keep the better, write its folder."""
@@ -219,7 +220,7 @@ def _kept(
         policy, kept = load_policy(str(parent)), before  # type: ignore[assignment]
     else:
         kept = after
-    card = card_of(learner, clips, asdict(config), before, after, kept is before)
+    card = card_of(learner, clips, asdict(config), before, after, kept is before, known)
     shown = next((clip for clip in clips if clip.split == "test"), clips[0])
     with new_folder(out) as folder:
         policy.save(folder)

@@ -9,6 +9,8 @@ from bumblebee.robot.facts import KEY_BODIES
 
 CARD = "card.json"
 """File of a policy's folder: its card as plain data."""
+NOTHING = "nothing"
+"""Name of the start of a training that goes on from no policy."""
 
 
 def card_text(title: str, contract: dict[str, Any], tried: Mapping[str, Iterable[str]], made: Iterable[str]) -> str:

@@ -1,5 +1,6 @@
 """The policy that comes with BumbleBee, live on the embedded motions: no training, no files, no other server."""
 
+import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -31,7 +32,7 @@ def at_hand(path: Path) -> Iterator[Path]:
     Raises:
         BadInput: nothing lies there, and no policy has the name.
     """
-    if path.exists():
+    if os.path.lexists(path):  # False for a name that the system refuses, too
         yield path
         return
     if str(path) not in SHIPPED:

@@ -50,32 +50,20 @@ def over_wire(play: Play) -> list[Rollout]:
     for episode in play.work.episodes:
         policy, clip = play.policies[episode.policy], play.clips[episode.motion]
         undone = play.work.undone.get(episode.policy)
-        done, rows = rehearsed(policy, clip, play.effects, episode.seed, limits, undone)
+        run = prepared(policy, clip, play.effects, episode.seed, limits, undone)
+        rows = records_of(run, run.entries())
         try:
             made.append(rollout_of(_about(episode, policy, undone), rows))
         except BadInput as few:
             if few.where != episode.rollout_id:
                 raise
-            print(f"{few.where}: nothing measured, the rule {done.guard.reason} ended it", flush=True)
+            print(f"{few.where}: nothing measured, the rule {run.guard.reason} ended it", flush=True)
         else:
             made[-1].meta.update(episode.meta)
         play.tick(clip.frames)
     if not made:
         raise BadInput("stand-in robot over a wire", "one run in which the policy carries it", "none")
     return made
-
-
-def rehearsed(
-    policy: ExportedPolicy,
-    clip: Clip,
-    effects: Sequence[Json],
-    seed: int,
-    limits: Limits = Limits(),  # noqa: B008  (frozen)
-    undone: Compensation | None = None,
-) -> tuple[Rehearsal, np.ndarray]:
-    """A run, and its journal's records."""
-    run = prepared(policy, clip, effects, seed, limits, undone)
-    return run, records_of(run, run.entries())
 
 
 def prepared(

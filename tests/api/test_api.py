@@ -112,7 +112,12 @@ def test_a_child_names_the_licences_of_all_its_parents_and_calls_nothing_unseen(
     child.mkdir()
     (child / "card.json").write_text(json.dumps({"licences": {"CC-BY-NC-4.0": 3}, "learnt_before": own}))
     assert learnt_before(str(child)) == [*own, f"`{child}`: CC-BY-NC-4.0 (3)"]
-    assert "licences unknown" in learnt_before(str(tmp_path))[0]
+    assert "licences unknown" in learnt_before(str(tmp_path))[0] and learnt_before("nothing") == []
+    for text, said in (('["x"]', "a policy's card"), ('{"licences": 3}', "a policy's card"), ("{", "card.json")):
+        (child / "card.json").write_text(text)
+        with pytest.raises(bb.BadInput, match=re.escape(said)):
+            bb.train([nod()], tmp_path / "never", start=str(child))
+    assert not (tmp_path / "never").exists()
     assert splits(None)["test"] == "held out" and "may have learnt them" in splits(child)["test"]
 
 
