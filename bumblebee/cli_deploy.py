@@ -187,12 +187,13 @@ def robot(
     from bumblebee.wire.line import LineFaults
     from bumblebee.wire.realtime import ROBOT, harden
     from bumblebee.wire.robot import RobotSettings
-    from bumblebee.wire.robot_process import run_robot
+    from bumblebee.wire.robot_process import require_alone, run_robot
 
     quiet_mujoco()
     faults = LineFaults(delay / 1e3, jitter / 1e3, dropped, late)
     settings = RobotSettings(seed=seed, odometry=odometry, states=faults, orders=faults)
     effects = read_sealed(sealed) if sealed else []
+    require_alone(wire, at)
     harden(ROBOT)
     print(f"a simulated G1 on the wire {wire}; Ctrl-C ends it", flush=True)
     made = run_robot(wire, at, effects, settings, slow, seconds, lambda line: print(line, flush=True))

@@ -1,4 +1,8 @@
-"""Soft time limit of a search: running steps finish, later ones are skipped and listed."""
+"""Soft limit of a search in processor time: running steps finish, later ones are skipped and listed.
+
+The processor's time and not the clock's, of all threads: what is found depends neither on what else the machine does,
+nor on how many cores it has.
+"""
 
 import time
 from collections.abc import Callable
@@ -7,14 +11,14 @@ from dataclasses import dataclass, field
 
 @dataclass(eq=False)
 class Budget:
-    """Seconds from its making on; the clock is a parameter so that tests need not wait."""
+    """Seconds of this process from its making on; the clock is a parameter so that tests need not wait."""
 
     seconds: float = float("inf")
     search: str = "beyond the catalogue"
     """Name of what is sought."""
     setting: str = "beyond_seconds"
     """Where the seconds are set."""
-    clock: Callable[[], float] = time.monotonic
+    clock: Callable[[], float] = time.process_time
     left_out: list[str] = field(default_factory=list)
     """Work that was not begun, in words, each once."""
     began: float = field(init=False)
@@ -35,6 +39,6 @@ class Budget:
         if not self.left_out:
             return []
         return [
-            f"the search {self.search} ended at its time limit of {self.seconds:.0f} s (`{self.setting}`); not tried: "
+            f"the search {self.search} ended at its limit of {self.seconds:.0f} s of processor time (`{self.setting}`); not tried: "
             + "; ".join(self.left_out)
         ]

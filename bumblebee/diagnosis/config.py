@@ -52,12 +52,12 @@ class DiagnosisConfig:
     beyond: bool = True
     """Whether to look for structure that no effect of the catalogue explains, and for its form."""
     beyond_seconds: float = 100.0
-    """Time after which nothing more is begun in that search [s]; the notes then say what was not tried.
+    """Processor time after which nothing more is begun in that search [s]; the notes then say what was not tried.
 
     For up to 12 degrees of freedom; in proportion longer for more, where every trial is.
     """
     search_seconds: float = 600.0
-    """Time limit of the search among the catalogue's effects [s]; what was found by then is fitted and reported."""
+    """Processor time of the search among the catalogue's effects [s]; what was found by then is fitted and reported."""
     search: SearchConfig = field(default_factory=SearchConfig)
     """How strict the search is."""
     thresholds: Thresholds = field(default_factory=Thresholds)

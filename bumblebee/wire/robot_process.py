@@ -3,10 +3,31 @@
 from collections.abc import Callable, Sequence
 
 from bumblebee.deploy.stand_in_effects import Json
+from bumblebee.errors import BadInput
 from bumblebee.wire.clock import SECOND, Clock
 from bumblebee.wire.link import open_link
-from bumblebee.wire.messages import ORDER, Mode
+from bumblebee.wire.messages import ORDER, STATE, Mode
 from bumblebee.wire.robot import RobotSettings, WireRobot
+
+_LISTEN = 0.5  # s in which another robot of this wire would have told its state
+
+
+def require_alone(wire: str, at: str) -> None:
+    """Refuse a wire on which a robot tells its state already; of `unitree` that is not looked for.
+
+    Raises:
+        BadInput: one does.
+    """
+    if wire == "unitree":  # whose states reach no one but a controller
+        return
+    link = open_link(wire, [STATE], at)
+    try:
+        link.wait(_LISTEN)
+        if link.received():
+            do = "End that one, or give each its own --at."
+            raise BadInput(f"wire {wire}", "no robot on it yet", "states of one", do)
+    finally:
+        link.close()
 
 
 def run_robot(

@@ -1,5 +1,7 @@
 """A soft time limit: running steps finish, skipped ones are listed, and what is left is flagged all the same."""
 
+import time
+
 import pytest
 
 from bumblebee.diagnosis.budget import Budget
@@ -25,8 +27,17 @@ def test_the_note_says_which_search_was_cut_and_by_what_setting() -> None:
     now[0] = 61.0
     assert not budget.has_time_for("more effects")
     (note,) = budget.notes()
-    ended = "the search among the catalogue's effects ended at its time limit of 60 s"
+    ended = "the search among the catalogue's effects ended at its limit of 60 s of processor time"
     assert note == f"{ended} (`search_seconds`); not tried: more effects"
+
+
+def test_time_in_which_others_work_does_not_count() -> None:
+    budget = Budget(0.05)
+    time.sleep(0.1)
+    assert budget.has_time_for("more effects")
+    while time.process_time() - budget.began <= 0.05:
+        pass
+    assert not budget.has_time_for("more effects")
 
 
 def test_a_search_without_time_ends_and_says_so() -> None:

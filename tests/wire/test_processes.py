@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.errors import BadInput
 from bumblebee.learning.export import export_shipped
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.wire import packets, realtime
@@ -37,6 +38,8 @@ from bumblebee.wire.questions import (
     encode_answer,
     encode_question,
 )
+from bumblebee.wire.robot import RobotSettings, WireRobot
+from bumblebee.wire.robot_process import require_alone
 from bumblebee.wire.rollouts import ended_by
 from bumblebee.wire.session import Run, run
 from tests.deploy.conftest import nod
@@ -204,6 +207,28 @@ def test_the_brain_that_is_kept_warm_answers_the_last_question_again_and_nobody_
     ours.shutdown(socket.SHUT_WR)
     serving.join()
     assert [decode_answer(message, 3).tick for message in packets.received(ours)] == [5]
+
+
+def test_a_second_robot_on_a_wire_is_refused(tmp_path: Path) -> None:
+    at = address("sim", tmp_path)
+    require_alone("sim", at)
+    first = WireRobot([], RobotSettings(), 0)
+    link, ended = open_link("sim", [ORDER], at), threading.Event()
+
+    def live() -> None:
+        while not ended.wait(0.02):
+            for channel, message in first.advance(first.next_period, []):
+                link.send(channel, message)
+
+    living = threading.Thread(target=live)
+    living.start()
+    try:
+        with pytest.raises(BadInput, match="wire sim: expected no robot on it yet, came states of one"):
+            require_alone("sim", at)
+    finally:
+        ended.set()
+        living.join()
+        link.close()
 
 
 LCM = pytest.param("lcm", marks=[pytest.mark.slow, pytest.mark.skipif(not lcm_here(), reason="no lcm or multicast")])
