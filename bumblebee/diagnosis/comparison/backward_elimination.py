@@ -98,7 +98,7 @@ def drop_unsure(problem: Problem, fit: Fit, weights: np.ndarray, simulated: bool
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         bounds = [rule.sure_z_of_body if c.effect in USUAL_OF_BODIES else rule.sure_z for c in fit.chosen]
-        marks = certainty(problem, fit, weights) / bounds if fit.chosen else []
+        marks = certainty(problem, fit, weights) / bounds if fit.chosen else np.empty(0)
         return _lowest(fit, [np.inf if c in kept else m for c, m in zip(fit.chosen, marks, strict=True)], 1.0)
 
     def without(fit: Fit, gone: Candidate) -> Fit:
@@ -156,7 +156,7 @@ def drop_redundant(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         if kept or not fit.chosen:  # one that must stay ends it
             return None
-        growth, felt = _growth(holdout.problem, fit)
+        growth, felt = _growth(holdout.judge, fit)
         growth[[c.effect in SATURATIONS for c in fit.chosen]] = np.inf
         growth[felt < rule.felt] = np.inf
         k = int(np.argmin(growth))
@@ -235,8 +235,7 @@ def drop_unpaid(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | Non
 
 def shares(holdout: Holdout, fit: Fit) -> np.ndarray:
     """(F,) of what all effects gain on the validation windows, what is lost without each, the others as they are."""
-    problem = holdout.problem
-    assert problem is not None
+    problem = holdout.judge
     sets = [fit.effects, *([e for k, e in enumerate(fit.effects) if k != i] for i in range(len(fit.chosen))), []]
     raw = problem.residual(sets)
     left = raw - np.tensordot(fit.nuisance, problem.nuisance, axes=1)

@@ -91,7 +91,7 @@ def _validation(c: Comparison, rule: Validation) -> bool:
     """
     if c.validation is None:
         return True
-    problem = c.holdout.problem
+    problem = c.holdout.judge
     old, new = c.validation
     weights = window_weights(new)
     bare = problem.residual([[]])[0]

@@ -31,6 +31,13 @@ class Holdout:
     """More of these, on which the last fit must not be worse: one window in a hundred may be where it goes wrong."""
     recall: Recall = field(default_factory=Recall, repr=False)
 
+    @property
+    def judge(self) -> Problem:
+        """The problem of the validation windows; a ValueError where nothing is held out."""
+        if self.problem is None:
+            raise ValueError("nothing is held out")
+        return self.problem
+
     def relinearised(self, effects: Sequence[Effect]) -> "Holdout":
         """Validation windows around a model with `effects`."""
         return self if self.problem is None else self._with(self.problem.relinearised(effects))
@@ -55,9 +62,7 @@ class Holdout:
 
     def left(self, fits: Sequence[Fit]) -> np.ndarray:
         """Held-out residuals (F, W, M) of fits, each less its own nuisances."""
-        problem = self.problem
-        if problem is None:
-            raise ValueError("nothing is held out")
+        problem = self.judge
         raw = problem.residual([f.effects for f in fits])
         return np.stack(
             [r - np.tensordot(f.nuisance, problem.nuisance, axes=1) for r, f in zip(raw, fits, strict=True)]
@@ -71,14 +76,14 @@ class Holdout:
         """
         if self.long is None or self.problem is None:
             return False
-        p = self.problem
+        p, long = self.problem, self.long
         part = p.layout.slices["joint_pos"]
 
         def simulated(new: Sequence[Sequence[Effect]]) -> np.ndarray:
             models = [vary(p.plant, effects) for effects in new]
-            return residuals(p.plant, p.layout, self.long, models, p.fine)[:, :, -1, part]
+            return residuals(p.plant, p.layout, long, models, p.fine)[:, :, -1, part]
 
-        raw = self.recall.get((self.long,), [before.effects, after.effects], p.fine, simulated)
+        raw = self.recall.get((long,), [before.effects, after.effects], p.fine, simulated)
         diverged = ~np.isfinite(raw).all(axis=2)
         if diverged[1].sum() > diverged[0].sum():
             return True
@@ -92,7 +97,8 @@ class Holdout:
     @cached_property
     def late(self) -> np.ndarray:
         """(B, L, J) what numerical differences do to joint positions after 1 s [rad]; 0 where they diverge."""
-        p = self.problem
+        p = self.judge
+        assert self.long is not None
         columns = nuisance_columns(
             p.plant, p.layout, self.long, vary(p.plant, []), p.fine, p.thresholds.residuals.nuisances
         )

@@ -90,7 +90,8 @@ def _listed(pairs: Iterable[tuple[str, str]]) -> str:
 
 def _closed(model: mujoco.MjModel, plant: Plant, poses: np.ndarray) -> dict[Pair, np.ndarray]:
     """Pairs of bodies -> how deep (W,) [m] they are in each other in joint positions (W, J); 0 where they are not."""
-    data, found = mujoco.MjData(model), {}
+    data = mujoco.MjData(model)
+    found: dict[Pair, np.ndarray] = {}
     for row, pose in enumerate(poses):
         data.qpos[:] = model.qpos0
         data.qpos[plant.qpos] = pose - plant.offset

@@ -82,7 +82,9 @@ def varied(rollouts: Sequence[Rollout]) -> dict[str, list[dict[str, Any]]]:
     out = {}
     for name in dict.fromkeys(name for _, one in stated for name in one):
         values = _sorted({one[name] for _, one in stated if name in one})
-        groups = [{"value": v, "rollouts": [i for i, one in stated if one.get(name) == v]} for v in values]
+        groups: list[dict[str, Any]] = [
+            {"value": v, "rollouts": [i for i, one in stated if one.get(name) == v]} for v in values
+        ]
         unstated = [i for i, one in stated if name not in one]
         groups += [{"value": None, "rollouts": unstated}] if unstated else []
         if len(groups) > 1:

@@ -75,7 +75,7 @@ class Quantities:
         if (joint, key) not in self._known:
             state = State(joint, key, numbers)
             now, out = state_before(self.plant, self.windows, state), np.empty(self.t.shape)
-            for k in range(out.shape[1]):
+            for k in range(self.t.shape[1]):
                 now = state.at(now, self.u[:, k, joint], self.t[:, k], self.path.step)
                 out[:, k] = now
                 now = state.after(now, self.v[:, k, joint], self.path.step)

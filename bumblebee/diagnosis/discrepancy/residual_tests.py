@@ -211,7 +211,7 @@ def confirmed(scene: Scene, sought: Sought, validation: Scene | None) -> list[tu
         at += len(one.torque)
         if validation is None and not _repeats(scene, one):
             continue
-        if validation is not None:
+        if validation is not None and left is not None:
             moved = validation.evidence.column(one.joint, one.function.torque(validation.data, one.joint))
             change = np.tensordot(size, moved, axes=1)
             if not is_confirmed(left, left - change, gain) and (

@@ -93,7 +93,7 @@ class Evidence:
         sizes = np.array([g.stop - g.start for g in groups])
         for count in np.unique(sizes):
             which = np.flatnonzero(sizes == count)
-            rows = np.stack([np.arange(groups[k].start, groups[k].stop) for k in which])
+            rows = np.stack([np.arange(groups[k].start, groups[k].stop) for k in which.tolist()])
             raw = np.einsum("gfn,ghn->gfh", wide[rows], flat[rows], optimize=True)
             curvature = raw - np.einsum("gfb,ghb->gfh", shares[rows], cross[rows], optimize=True)
             out[which] = _falls(total[rows], curvature, np.einsum("gff->gf", raw), self.rule)

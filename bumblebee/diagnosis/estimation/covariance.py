@@ -16,8 +16,8 @@ def covariance(problem: Problem, fit: Fit, weights: np.ndarray, clusters: np.nda
     """
     full, scores, normals = _clustered(problem, fit, weights, clusters)
     # Pseudo-inverse: without the one cluster in which an effect acts nothing is known of it.
-    rest = np.linalg.pinv(full - np.stack(normals), rcond=1e-12, hermitian=True)
-    moves = np.einsum("cij,cj->ci", rest, np.stack(scores))
+    rest = np.linalg.pinv(full - normals, rcond=1e-12, hermitian=True)
+    moves = np.einsum("cij,cj->ci", rest, scores)
     count = len(moves)
     moves = moves - moves.mean(axis=0)
     return _scaled(problem, fit, moves.T @ moves * (count - 1) / count)

@@ -77,7 +77,7 @@ def make_machine(spec: mujoco.MjSpec, name: str, session: Session | None, config
     driven, seen = {}, {}
     for gain in dict.fromkeys((Gain(), *config.all_gains)):
         scaled = _scaled(spec, gain, joints, name)
-        gains = {} if kp is None else {"kp": (gain.kp * kp).tolist(), "kd": (gain.kd * kd).tolist()}
+        gains = {} if kp is None or kd is None else {"kp": (gain.kp * kp).tolist(), "kd": (gain.kd * kd).tolist()}
         example = _example(scaled, joints, rate, gains, ("joint_target",))
         driven[gain] = make_plant(scaled, example, name, rules.simulation)
         refuse_unlogged(driven[gain], name)

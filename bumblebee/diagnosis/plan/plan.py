@@ -96,8 +96,9 @@ def _make_plan(
 ) -> Plan:
     """Make a plan on the threads that there are."""
     stage = set_stage(spec, name, config, session, findings)
-    known = None if session is None else _measured(stage.machine, session, findings, config)
-    if known is not None:
+    known: _Known | None = None
+    if session is not None:
+        known = _measured(stage.machine, session, findings, config)
         stage = _with_rivals(stage, session, known, findings, config)
     say(f"simulating {config.pool} candidate motions")
     safe = safe_pool(surest(stage), config)
@@ -190,7 +191,8 @@ class _Asking:
 
     def told(self, motions: Sequence[Motion], lens: Lens, logs: Sequence[Rollout]) -> np.ndarray:
         """Information (R, N, N) of the motions, each by the robot at its gain."""
-        machine, out = self.stage.machine, {}
+        machine = self.stage.machine
+        out: dict[int, np.ndarray] = {}
         for gain in dict.fromkeys(m.gain for m in motions):
             some = [i for i, m in enumerate(motions) if m.gain == gain]
             own = [logs[i] for i in some]

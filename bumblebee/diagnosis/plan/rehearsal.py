@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -84,11 +85,11 @@ def settled(machine: Machine, step: float, settle: float) -> Machine:
 
 def joined(parts: Sequence[Rehearsed]) -> Rehearsed:
     """Runs of the same length after each other."""
-    quats = [p.quat for p in parts]
+    quats = [p.quat for p in parts if p.quat is not None]
     return Rehearsed(
         np.concatenate([p.position for p in parts]),
         np.concatenate([p.reading for p in parts]),
-        None if quats[0] is None else np.concatenate(quats),
+        np.concatenate(quats) if quats else None,
         np.concatenate([p.torque for p in parts]),
         parts[0].layout,
     )
@@ -130,7 +131,7 @@ def _source(machine: Machine, motion: Motion, before: int) -> Rollout:
     rows, plant = len(targets), machine.driven[motion.gain]
     rest = np.zeros_like(targets)
     rest[:before] = machine.qpos[plant.qpos]
-    columns = {"joint_target": targets}
+    columns: dict[str, Any] = {"joint_target": targets}
     if plant.floating:
         q = plant.base_qpos
         place, quat = np.zeros((rows, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1))

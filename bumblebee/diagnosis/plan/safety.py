@@ -55,7 +55,7 @@ def _by_joint(stage: Stage, runs: Rehearsed, r: int, motion: Motion) -> Verdict:
     if broken.any():
         kind, worst = np.unravel_index(int(np.argmax(reached)), reached.shape)
         name = ("range", "speed limit", "torque limit")[int(kind)]
-        return Verdict(f"{machine.joints[int(worst)]} leaves its {name}", broken.any(axis=0), reached)
+        return Verdict(f"{machine.joints[int(worst)]} leaves its {name}", np.any(broken, axis=0), reached)
     moving = machine.moved & (np.abs(v[[0, -1]]).max(axis=0) > stage.rules.safety.still)
     if moving.any():
         return Verdict(f"{machine.joints[int(np.argmax(moving))]} is not at rest at the ends", moving, reached)

@@ -51,10 +51,10 @@ def cases_of(
         for end, values in zip(("lower", "upper"), finding.ends(rule.beyond), strict=True):
             if finding.differs(values, rule.same):
                 cases.append(Case(f"{finding.name} at the {end} end of its interval", [*rest, values], must=False))
-    for finding, candidate, values in rivals:
+    for finding, candidate, imitating in rivals:
         rest = [e for e in findings.effects if e is not finding.found]
         name = f"{candidate.effect} {candidate.where}".strip()
-        cases.append(Case(f"{name} in the place of {finding.name}", [*rest, candidate.at(values)], must=False))
+        cases.append(Case(f"{name} in the place of {finding.name}", [*rest, candidate.at(imitating)], must=False))
     return cases
 
 

@@ -105,12 +105,12 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
 
     No model declares a surface that it lacks, nor do data say which point of a body touches it.
     """
-    out = {}
+    out: dict[str, Any] = {}
     # A limit is tried from the largest torque in the data on, which is not where the model has it.
     declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
     if c.effect == SURFACE:
         told = (c.scales > 0) & np.isfinite(half)
-        declared, half = [np.inf] * len(values), np.where(told, half, np.nan)
+        declared, half = (np.inf,) * len(values), np.where(told, half, np.nan)
     for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
         if p.default is not None and value == p.default:
             continue
@@ -123,9 +123,9 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
         else:
             inside = np.clip(ends, p.lower, p.upper).tolist()
             open_ends = c.effect == SURFACE and ends[0] <= p.lower and ends[1] >= p.upper
-            ends = [end if np.isfinite(end) and not open_ends else None for end in inside]
+            shown = [end if np.isfinite(end) and not open_ends else None for end in inside]
             known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
-            out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": unit}
+            out[p.name] = {"value": float(value), "ci95": shown, "nominal": known, "unit": unit}
     return out
 
 

@@ -104,8 +104,8 @@ def _effects(document: dict[str, Any], rules: ReportThresholds) -> str:
 
 def _effect(e: dict[str, Any], rule: Listing) -> list[str]:
     place, share = escape(", ".join(e["where"]) or "whole robot"), lost_without(e)
-    wide = 4.0 * (e["explains"] or 0.0)
-    bar = f"<span class='share'><span class='bar' style='width:{wide:.2f}rem'></span>{share}</span>"
+    length = 4.0 * (e["explains"] or 0.0)
+    bar = f"<span class='share'><span class='bar' style='width:{length:.2f}rem'></span>{share}</span>"
     values, declared = _values(e, rule)
     wide = "<br><span class='note'>size uncertain</span>" if e.get("wide") else ""
     name = f"<b>{escape(e['effect'])}</b><br><span class='place'>{place}</span>"

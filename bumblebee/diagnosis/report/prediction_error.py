@@ -94,7 +94,7 @@ def block_of(cuts: HorizonWindows, whiteners: Whiteners, ends: Residuals, seed: 
     for name, part in cuts.windows.items():
         keep, whitener = whiteners[name]
         raw = ends[name]
-        good = np.isfinite(raw).all(axis=(1, 2))
+        good = np.all(np.isfinite(raw), axis=(1, 2))
         chi = (whitener(raw[keep]) ** 2).mean(axis=1)[good[keep]]
         chi_groups = part.rollout[keep][good[keep]]
         block[name] = _measures(cuts, (raw[good, 0], part.rollout[good]), (chi, chi_groups), rng)

@@ -70,7 +70,7 @@ def _share(
     sums = np.stack([np.bincount(index, row) for row in squares])
     counts = np.bincount(index).astype(float)
     before, after = np.sqrt(sums.sum(axis=1) / counts.sum())
-    out = {"before": float(before), "after": float(after), "floor": floor, "share": None, "ci95": None}
+    out: dict[str, Any] = {"before": float(before), "after": float(after), "floor": floor, "share": None, "ci95": None}
     if floor is None or before <= least * floor:
         return out
     out["share"] = float((before - after) / (before - floor))

@@ -137,9 +137,9 @@ def _narrowest(effect: Mapping[str, Any]) -> float | None:
 
 
 def _fold(ends: Sequence[float | None] | None, declared: float | None) -> float | None:
-    if not ends or None in ends:
+    low, high = ends or (None, None)
+    if low is None or high is None:
         return None
-    low, high = ends
     if low * high <= 0 or (declared is not None and low <= declared <= high):
         return None
     return float(max(abs(low), abs(high)) / min(abs(low), abs(high)))

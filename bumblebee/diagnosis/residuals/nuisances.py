@@ -86,10 +86,12 @@ def _read_thrice(windows: Windows, after: float, before: float) -> Windows:
     """Windows (N ticks) compared at their ticks, `before` s before each, and `after` s from the start."""
     ticks = windows.out_time
     times = np.concatenate((ticks, ticks - before, np.full((len(windows), 1), after)), axis=1)
-    measured, quat = (
-        None if x is None else np.concatenate((x, x, x[:, :1]), axis=1) for x in (windows.measured, windows.quat)
-    )
-    return replace(windows, out_time=times, measured=measured, quat=quat)
+
+    def thrice(x: np.ndarray) -> np.ndarray:
+        return np.concatenate((x, x, x[:, :1]), axis=1)
+
+    quat = None if windows.quat is None else thrice(windows.quat)
+    return replace(windows, out_time=times, measured=thrice(windows.measured), quat=quat)
 
 
 def _faster(plant: Plant, windows: Windows, by: np.ndarray) -> Starts:

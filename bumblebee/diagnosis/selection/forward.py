@@ -133,7 +133,8 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
 
 def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
     """Forward selection until nothing is worth a trial, too many in a row were in vain, or the time is over."""
-    vain, judged, limits, touching, attempt = 0, None, [], _Touching(run), run.problem.plant.failures.attempt
+    vain, judged, touching, attempt = 0, None, _Touching(run), run.problem.plant.failures.attempt
+    limits: list[Trial] = []
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
         if not budget.has_time_for("more effects"):
             break
@@ -141,7 +142,7 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         if anew:
             continue
         tried += attempt("contact with a surface", touching.trials, list)
-        late = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
+        late: list[Trial] = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
         tried += [t for t in late if t.candidate not in run.closed]
         tried += attempt("torque ripple", partial(ripple_trials, run, tried), list)
         some = _where_limits_matter(tried, run)
@@ -185,7 +186,8 @@ def look_around(run: SearchState) -> tuple[list[Trial], list[Candidate], bool]:
 def single_trials(run: SearchState) -> tuple[list[Trial], list[Candidate]]:
     """Trials of single effects, and those looked at; drives far from the declared ones first."""
     attempt = run.problem.plant.failures.attempt
-    tried, looked = [], []
+    tried: list[Trial] = []
+    looked: list[Candidate] = []
     if not run.given:
         tried = attempt("drives far from the declared ones", partial(_drives, run), list)
         tried = [t for t in tried if t.candidate not in run.closed]
@@ -199,7 +201,9 @@ class _Touching:
     """Contacts with a surface that the model lacks, sought once for each fit."""
 
     def __init__(self, run: SearchState) -> None:
-        self.run, self.fit, self.found = run, None, []
+        self.run = run
+        self.fit: Fit | None = None
+        self.found: list[Trial] = []
 
     def trials(self) -> list[Trial]:
         """The best, if none was refused there."""

@@ -72,6 +72,12 @@ class SearchState:
         self.answers = Answered(self.fit.effects, white, (self.problem.windows, self.problem.whitener))
         self.screened_cost = self.fit.cost
 
+    @property
+    def white(self) -> np.ndarray:
+        """(W, nv, S, M) whitened answers of the screening windows to pulses; there once the search is open."""
+        assert self.answers is not None
+        return self.answers.white
+
     def small_fit(self) -> Fit:
         """The fit on the screening windows."""
         return replace(self.fit, residual=self.fit.residual[self.keep], columns=self.fit.columns[:, self.keep])
@@ -84,7 +90,7 @@ class SearchState:
         """The best of the screening, and play and shafts of the joints that are worst explained."""
         tests, bound = self.tests(), self.rule.bound_share
         share = np.sqrt(len(self.keep) / len(self.problem.windows))
-        found = []
+        found: list[Candidate] = []
         rule = self.rule
         sure, least = rule.sure * max(self.fit.cost / self.fit.residual.size, 1.0) * (share * self.bound) ** 2, 0.0
         for k in np.argsort(-tests.gain):
@@ -96,7 +102,7 @@ class SearchState:
                 if tests.gain[k] > sure and tests.z[k] > self.bound:
                     least = max(least, rule.faint * tests.gain[k])
         left = self.small_fit().clean(self.small)
-        poor = restless(self.small, self.answers.white, left, self.config.shortlist)
+        poor = restless(self.small, self.white, left, self.config.shortlist)
         joints = len(self.problem.plant.joints)
         listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
         listed = [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
@@ -132,8 +138,8 @@ class SearchState:
         joints, best = len(self.problem.plant.joints), max((tests.gain[k] for k in order), default=0.0)
         faint = [k for k in order if tests.gain[k] < self.rule.faint * best and not shortlisted(left[k], joints)]
         wait, order = [left[k] for k in faint], [k for k in order if k not in faint][: self.config.trials]
-        tried = [try_one(self.problem, self.fit, left[k], tests.steps[k], self.weights) for k in order]
-        tried = [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2]
+        every = [try_one(self.problem, self.fit, left[k], tests.steps[k], self.weights) for k in order]
+        tried = [t for t in every if t is not None and t.cost < self.fit.cost - self.bound**2 / 2]
         return tried, [c for c in looked if c not in wait]
 
     def left_over(self, looked: Sequence[Candidate]) -> list[Candidate]:

@@ -40,7 +40,7 @@ def told_apart(problem: Problem, holdout: Holdout, fit: Fit, rest: Fit, trial: T
     if sum(worse) < rule.chi_square or against.passes(rule.windows):
         return False
     most = int(np.argmax(worse))
-    share = _held_out_share(holdout.problem, other, fit) if most else explained_share(problem, other, fit, weights)
+    share = _held_out_share(holdout.judge, other, fit) if most else explained_share(problem, other, fit, weights)
     return share < rule.numerics
 
 
@@ -53,5 +53,5 @@ def _held_out_share(problem: Problem, before: Fit, after: Fit) -> float:
     """Share that other integrators would make of the change from `before` to `after` on the validation windows."""
     old, new = problem.residual([before.effects, after.effects])
     none = np.empty((0, *old.shape))
-    sides = [replace(fit, residual=residual, columns=none) for fit, residual in ((before, old), (after, new))]
-    return explained_share(problem, *sides, window_weights(sides[1].clean(problem)))
+    first, last = (replace(fit, residual=r, columns=none) for fit, r in ((before, old), (after, new)))
+    return explained_share(problem, first, last, window_weights(last.clean(problem)))

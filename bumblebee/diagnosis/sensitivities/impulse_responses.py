@@ -92,14 +92,14 @@ def answers_of(
     def readings(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """(copies, W, N, D) from states at all steps (copies * W, K + 1, .)."""
         copies = len(q) // size
-        parts = (at_ticks(windows, x[:, 0].reshape(copies, size, -1), x[:, 1:], step, copies) for x in (q, v))
-        return simulated_readings(plant, layout, *parts, variation.offset)
+        at_q, at_v = (at_ticks(windows, x[:, 0].reshape(copies, size, -1), x[:, 1:], step, copies) for x in (q, v))
+        return simulated_readings(plant, layout, at_q, at_v, variation.offset)
 
     base, base_quat = readings(path.qpos, path.qvel)
     change = np.zeros((plant.model.nv, len(edges) - 1, size, *base.shape[2:]))
     for s in range(len(edges) - 1):
         moved, moved_quat = readings(*_pushed_path(batch, path, np.diag(sizes)[pushed], s))
-        same = None if base_quat is None else np.broadcast_to(base_quat, moved_quat.shape)
+        same = None if base_quat is None or moved_quat is None else np.broadcast_to(base_quat, moved_quat.shape)
         change[pushed, s] = difference(layout, moved, moved_quat, np.broadcast_to(base, moved.shape), same)
     change /= sizes[:, None, None, None, None]
     return Answers(path, np.nan_to_num(change))

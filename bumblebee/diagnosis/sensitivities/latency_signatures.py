@@ -66,12 +66,12 @@ class Late:
         ago = step * np.arange(back, 0, -1)[:, None]
         at = back - delay / step
         low = int(np.floor(at + 1e-9))
-        seen = []
+        seen: list[np.ndarray] = []
         for values, ahead in zip((self._q, self._v), self._start(delay), strict=True):
             every = np.concatenate((values[:, :1] - ago * (ahead / delay)[:, None], values[:, :-1]), axis=1)
             older, newer = every[:, low : low + count], every[:, low + 1 : low + 1 + count]
             seen.append(older + max(at - low, 0.0) * (newer - older))
-        return self._servos.torque(*seen, self._servos.controls(self._path.control))
+        return self._servos.torque(seen[0], seen[1], self._servos.controls(self._path.control))
 
     def _start(self, delay: float) -> np.ndarray:
         """By how much joints [rad] and speeds [rad/s] are ahead of `delay` [s] old readings at starts, (2, W, J)."""

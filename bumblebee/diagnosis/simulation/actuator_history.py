@@ -227,7 +227,7 @@ def _past(
 
 
 def read_at(
-    windows: Windows, shift: float, delay: np.ndarray, order: Sequence[int], rule: JointPath
+    windows: Windows, shift: float, delay: np.ndarray, order: Sequence[int] | np.ndarray, rule: JointPath
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (W, J) that the joints `order` had `shift` s after the starts, by their late readings.
 
@@ -241,7 +241,7 @@ def read_at(
 
 
 def _read_at_each(
-    windows: Windows, shifts: np.ndarray, delay: np.ndarray, order: Sequence[int], rule: JointPath
+    windows: Windows, shifts: np.ndarray, delay: np.ndarray, order: Sequence[int] | np.ndarray, rule: JointPath
 ) -> tuple[np.ndarray, np.ndarray]:
     """Readings (W, S, J) at several shifts (S,) at once."""
     place, speed = np.empty((2, len(windows), len(shifts), len(order)))

@@ -18,6 +18,7 @@ def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
     model, data, depth = plant.model, mujoco.MjData(plant.model), plant.thresholds.base_height.rest_depth
     geoms = [g for g in range(model.ngeom) if touches(model, g)]
     out = np.zeros(rollout.frames)
+    assert rollout.base_quat is not None  # the base is floating
     for k in range(rollout.frames):
         data.qpos[:] = model.qpos0
         data.qpos[plant.base_qpos : plant.base_qpos + 3] = 0.0

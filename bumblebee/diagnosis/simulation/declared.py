@@ -25,7 +25,7 @@ def declared_values(plant: Plant, kind: str, place: str) -> tuple[float, ...]:
     return (*map(float, found), *(0.0,) * (len(entry.parameters) - len(found)))
 
 
-_Declared = Callable[[Plant, str], Sequence[float]]
+_Declared = Callable[[Plant, str], Sequence[float] | np.ndarray]
 """(plant, place) -> the first parameters; the others are 0."""
 
 

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import mujoco
@@ -247,7 +248,7 @@ def _run(chunk: _Chunk, layout: Layout, inputs: list[np.ndarray]) -> np.ndarray:
     if quat is not None and lead.tilt is not None:
         quat = multiply(quat, from_rotation_vector(lead.tilt))
     measured = np.broadcast_to(windows.measured, simulated.shape)
-    target = None if windows.quat is None else np.broadcast_to(windows.quat, quat.shape)
+    target = None if windows.quat is None or quat is None else np.broadcast_to(windows.quat, quat.shape)
     result = difference(layout, measured, target, simulated, quat)
     result[failed.reshape(copies, size)] = np.nan
     return result
@@ -319,7 +320,8 @@ def _roll(
 def _repeated(memory: Memory, copies: int) -> Memory:
     """The memory of every window, once for each copy of the windows."""
     values = {f.name: getattr(memory, f.name) for f in fields(memory)}
-    return Memory(**{k: None if v is None else np.concatenate([v] * copies) for k, v in values.items()})
+    more: dict[str, Any] = {k: None if v is None else np.concatenate([v] * copies) for k, v in values.items()}
+    return Memory(**more)
 
 
 def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

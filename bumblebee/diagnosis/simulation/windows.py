@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -129,19 +130,19 @@ def cut(
         picks = np.linspace(last - k, min(firsts[i], last - k), count)[::-1]  # one output: the last tick
         picks = np.floor(picks + 0.5).astype(int)
         rows.append(_one(plant, rollouts[i], cache[i], commands[i], heights.get(i), k, picks))
-    size = max(len(row["command_time"]) for row in rows)
-    quats = [row["quat"] for row in rows]
+    size = max(len(row.command_time) for row in rows)
+    quats = [row.quat for row in rows if row.quat is not None]
     return Windows(
         rollout=np.array([s[0] for s in starts]),
         start=np.array([s[1] for s in starts]),
-        span=max(float(row["out_time"][-1]) for row in rows),
-        out_time=np.stack([row["out_time"] for row in rows]),
-        qpos=np.stack([row["qpos"] for row in rows]),
-        qvel=np.stack([row["qvel"] for row in rows]),
-        measured=np.stack([row["measured"] for row in rows]),
-        quat=None if quats[0] is None else np.stack(quats),
-        command=np.stack([_pad(row["command"], size) for row in rows]),
-        command_time=np.stack([_pad(row["command_time"], size) for row in rows]),
+        span=max(float(row.out_time[-1]) for row in rows),
+        out_time=np.stack([row.out_time for row in rows]),
+        qpos=np.stack([row.qpos for row in rows]),
+        qvel=np.stack([row.qvel for row in rows]),
+        measured=np.stack([row.measured for row in rows]),
+        quat=np.stack(quats) if quats else None,
+        command=np.stack([_pad(row.command, size) for row in rows]),
+        command_time=np.stack([_pad(row.command_time, size) for row in rows]),
         condition=np.array([plant.under.get(rollouts[s[0]].rollout_id, 0) for s in starts]),
         source=rollouts,
     )
@@ -180,6 +181,18 @@ def _pad(values: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate((values, np.repeat(values[-1:], size - len(values), axis=0)))
 
 
+class _Window(NamedTuple):
+    """One window, its fields as in `Windows`."""
+
+    out_time: np.ndarray
+    qpos: np.ndarray
+    qvel: np.ndarray
+    measured: np.ndarray
+    quat: np.ndarray | None
+    command: np.ndarray
+    command_time: np.ndarray
+
+
 def _one(
     plant: Plant,
     rollout: Rollout,
@@ -188,22 +201,22 @@ def _one(
     heights: np.ndarray | None,
     k: int,
     picks: np.ndarray,
-) -> dict[str, np.ndarray | None]:
+) -> _Window:
     signals, quat = readings
     t0 = rollout.time[k]
     issued, command = commands
     first = int(np.searchsorted(rollout.time, t0 - 2 * plant.thresholds.windows.lead))
     first, last = (int(np.searchsorted(issued, rollout.time[tick])) for tick in (first, k + int(picks[-1])))
     qpos, qvel = start_state(plant, rollout, k, None if heights is None else heights[k])
-    return {
-        "out_time": rollout.time[k + picks] - t0,
-        "qpos": qpos,
-        "qvel": qvel,
-        "measured": signals[k + picks],
-        "quat": None if quat is None else quat[k + picks],
-        "command": command[first : last + 1],
-        "command_time": issued[first : last + 1] - t0,
-    }
+    return _Window(
+        out_time=rollout.time[k + picks] - t0,
+        qpos=qpos,
+        qvel=qvel,
+        measured=signals[k + picks],
+        quat=None if quat is None else quat[k + picks],
+        command=command[first : last + 1],
+        command_time=issued[first : last + 1] - t0,
+    )
 
 
 def _every_command(time: np.ndarray, command: np.ndarray, rule: Windowing) -> tuple[np.ndarray, np.ndarray]:
@@ -231,11 +244,17 @@ def start_state(plant: Plant, rollout: Rollout, k: int, height: float | None) ->
     qpos[plant.qpos], qvel[plant.dof] = rollout.joint_pos[k], rollout.joint_vel[k]
     if plant.floating:
         q, v = plant.base_qpos, plant.base_dof
-        quat = rollout.base_quat[k] / np.linalg.norm(rollout.base_quat[k])
-        qpos[q : q + 3] = rollout.base_pos[k] if height is None else [0.0, 0.0, height]
+        turn, speed, spin, place = rollout.base_quat, rollout.base_lin_vel, rollout.base_ang_vel, rollout.base_pos
+        assert turn is not None and speed is not None and spin is not None  # `make_plant` saw to it
+        quat = turn[k] / np.linalg.norm(turn[k])
+        if height is None:
+            assert place is not None
+            qpos[q : q + 3] = place[k]
+        else:
+            qpos[q : q + 3] = [0.0, 0.0, height]
         qpos[q + 3 : q + 7] = quat
-        qvel[v : v + 3] = rotate_by_cross(quat, rollout.base_lin_vel[k])
-        qvel[v + 3 : v + 6] = rollout.base_ang_vel[k]
+        qvel[v : v + 3] = rotate_by_cross(quat, speed[k])
+        qvel[v + 3 : v + 6] = spin[k]
     return qpos, qvel
 
 

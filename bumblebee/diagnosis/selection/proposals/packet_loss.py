@@ -98,7 +98,7 @@ def packet_loss_of(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, 
     if gain < least or not lost.any():
         return None
     fitted = arrived(problem, lost, place)
-    if _cleared(clean, _clean(fitted, fit), lost.any(axis=1)) < rule.cleared:
+    if _cleared(clean, _clean(fitted, fit), np.any(lost, axis=1)) < rule.cleared:
         return None
     found = Loss(place, share, losses.interval(share), gain, np.inf, 1.0)
     if holdout.problem is not None:

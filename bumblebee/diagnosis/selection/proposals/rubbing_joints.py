@@ -15,5 +15,5 @@ def worth_asking(run: SearchState, rubbing: Sequence[str]) -> list[str]:
     if len(rubbing) <= rule.few_joints:
         return list(rubbing)
     left, every = run.small_fit().clean(run.small), len(run.problem.plant.joints)
-    worst = [where for where in restless(run.small, run.answers.white, left, every) if where in rubbing]
+    worst = [where for where in restless(run.small, run.white, left, every) if where in rubbing]
     return worst[: run.config.shortlist]

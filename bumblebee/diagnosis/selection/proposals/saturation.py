@@ -113,13 +113,19 @@ def saturation_trials(
         reach = demand.reach(kind, j)
         if not own_off[np.argsort(reach)[: rule.reached_first], j].any():
             continue
-        value, gain = _best(_Limit(problem, fit, clean, usual, own[0], reach, changes)) or (None, None)
-        if gain is not None and gain <= 0:
+        best = _best(_Limit(problem, fit, clean, usual, own[0], reach, changes))
+        if best is None:
+            continue
+        value, gain = best
+        if gain <= 0:
             hopeless.add((kind, where))
-        if gain is not None and gain > rule.least_gain:
-            nearest = min(own, key=lambda c, value=value: abs(c.start[0] - value))
-            found += _trial(problem, fit, weights, nearest, value, reach)
+        if gain > rule.least_gain:
+            found += _trial(problem, fit, weights, _nearest(own, value), value, reach)
     return sorted(found, key=lambda t: t.cost)[:1]
+
+
+def _nearest(candidates: Sequence[Candidate], value: float) -> Candidate:
+    return min(candidates, key=lambda c: abs(c.start[0] - value))
 
 
 def _trial(

@@ -9,6 +9,7 @@ windows that are furthest off, and the best of them on all. It takes the place i
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -117,6 +118,9 @@ def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tupl
         none, *others = some.residual(models, coarse=coarse)
         return [float(falls(some, none, r, usual).sum()) for r in others]
 
+    def gain_of(values: np.ndarray, size: float, speed: float = 1.0) -> float:
+        return gains([_scaled(values, size, speed)])[0]
+
     speeds = rule.speeds if candidate.shape_scale else (1.0,)
     series = profile(gains, [_scaled(first, size, speed) for speed in speeds for size in rule.factors])
     values, gain = series.size, series.gain
@@ -124,11 +128,11 @@ def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tupl
         return gain, values
     for _ in speeds[: rule.turns]:
         begin([_scaled(values, f) for f in reachable(rule.finer)])
-        size, gain = stepped(lambda f, v=values: gains([_scaled(v, f)])[0], 1.0, gain, rule.finer)
+        size, gain = stepped(partial(gain_of, values), 1.0, gain, rule.finer)
         values = _scaled(values, size)
         if candidate.shape_scale:
             begin([_scaled(values, 1.0, f) for f in reachable(rule.finer)])
-            speed, gain = stepped(lambda f, v=values: gains([_scaled(v, 1.0, f)])[0], 1.0, gain, rule.finer)
+            speed, gain = stepped(partial(gain_of, values, 1.0), 1.0, gain, rule.finer)
             values = _scaled(values, 1.0, speed)
     return gain, values
 

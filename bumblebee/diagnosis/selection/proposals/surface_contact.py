@@ -244,6 +244,7 @@ class _Tried:
     def __init__(self, many: _Many, place: _Place, rule: SurfaceContact) -> None:
         self.many, self.place, self.rule = many, place, rule
         order, count = np.argsort(place.lows), rule.windows
+        others: np.ndarray | list[int]
         others = np.linspace(count, len(order) - 1, count).astype(int) if len(order) > 2 * count else []
         self.keep = np.sort(order[[*range(min(count, len(order))), *others]])
         low = float(place.lows.min())
