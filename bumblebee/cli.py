@@ -22,7 +22,7 @@ _EPILOG = "`bumblebee COMMAND --help` explains a command; docs/commands.md has a
 app = typer.Typer(
     cls=Commands, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, epilog=_EPILOG
 )
-_UNUSABLE = typer.BadParameter.__bases__[0]  # the library's UsageError, which it does not export
+_UNUSABLE: type[Exception] = typer.BadParameter.__bases__[0]  # the library's UsageError, which it does not export
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
 Data = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]

@@ -158,9 +158,13 @@ class Ranged:
         self.require(low <= high, field, "the smaller number first")
 
 
-@cache
-def annotations(kind: Any) -> dict[str, Any]:
+def annotations(kind: type) -> dict[str, Any]:
     """The annotation of each field of a dataclass, ranges included."""
+    return _annotations(kind)
+
+
+@cache
+def _annotations(kind: type) -> dict[str, Any]:
     hints = typing.get_type_hints(kind, include_extras=True)
     return {name: hints[name] for name in getattr(kind, "__dataclass_fields__", {})}
 

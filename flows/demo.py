@@ -119,8 +119,9 @@ def start_check(folder: Path) -> "subprocess.Popen[str]":
     A slip in the last section must not cost the time of the stages before it.
     """
     command = [sys.executable, "-m", "tasks.sections"]
-    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-    return subprocess.Popen(command, cwd=folder, env=environment(folder), text=True, **pipes)
+    return subprocess.Popen(
+        command, cwd=folder, env=environment(folder), text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    )
 
 
 def check_cluster(folder: Path) -> None:

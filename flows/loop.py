@@ -13,13 +13,13 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from prefect import flow, get_run_logger, runtime, task
 from prefect.cache_policies import NO_CACHE
 from prefect.futures import PrefectFuture
 from prefect.states import Cancelled, Completed, Failed, State
-from prefect.task_runners import ThreadPoolTaskRunner
+from prefect.task_runners import TaskRunner, ThreadPoolTaskRunner
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import full_disk
@@ -167,7 +167,9 @@ def walk(folder: Path) -> State[Any]:
                 waiting = stage.name
                 log.warning(question)
                 continue
-        running[stage.name] = run_stage.submit(stage.title, stage.name, str(folder.resolve()), wait_for=before)
+        running[stage.name] = run_stage.submit(
+            stage.title, stage.name, str(folder.resolve()), return_state=False, wait_for=before
+        )
     state = outcome(running, stages, waiting)
     close("done" if state.is_completed() else "waits for an answer" if waiting else "failed")
     return state
@@ -208,6 +210,7 @@ def gates_last(stages: list[Stage]) -> list[Stage]:
     return order
 
 
-def runner(folder: Path) -> ThreadPoolTaskRunner[Any]:
+def runner(folder: Path) -> TaskRunner[PrefectFuture[Any]]:
     """A thread for each stage that may run at once; each only waits for its process, and on a cluster for a slot."""
-    return ThreadPoolTaskRunner(max_workers=ON_CLUSTER if on_cluster(folder) else os.cpu_count() or 1)
+    threads = ON_CLUSTER if on_cluster(folder) else os.cpu_count() or 1
+    return cast("TaskRunner[PrefectFuture[Any]]", ThreadPoolTaskRunner(max_workers=threads))  # Prefect's is invariant

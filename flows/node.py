@@ -71,8 +71,10 @@ def run(parcel: bytes, workspace: str, words: list[str], variables: dict[str, st
 
 
 def _said(command: list[str], tree: Path, variables: dict[str, str]) -> Iterator[str | int]:
-    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    with subprocess.Popen(command, cwd=tree, env=variables, text=True, errors="replace", **pipes) as process:
+    with subprocess.Popen(
+        command, cwd=tree, env=variables, text=True, errors="replace",
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    ) as process:  # fmt: skip
         assert process.stdout is not None
         for line in process.stdout:
             yield line.rstrip("\n")

@@ -12,7 +12,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Lock, Thread
-from typing import Any
+from typing import Any, cast
+from uuid import UUID
 
 from rich.console import Console
 from rich.live import Live
@@ -211,7 +212,8 @@ def page() -> Tell | None:
     from prefect.artifacts import create_progress_artifact, update_progress_artifact
 
     try:
-        made = create_progress_artifact(0.0, key=KEY, description="the loop begins")
+        # Prefect types it as a coroutine, too, which it is in async code alone.
+        made = cast(UUID, create_progress_artifact(0.0, key=KEY, description="the loop begins"))
     except Exception:  # the run shows in the terminal all the same
         return None
     return lambda percent, line: _drop(update_progress_artifact(made, min(percent, 100.0), line))

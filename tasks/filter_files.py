@@ -1,6 +1,6 @@
 """The files that the section `filter` names: dependencies of its stage, where they are named."""
 
-from typing import Any
+from typing import Any, TypeGuard
 
 SHIPPED = "shipped"
 """The policy that comes with BumbleBee, which is code and no file of the user's."""
@@ -16,5 +16,5 @@ def files_named(content: dict[str, Any]) -> list[tuple[str, str]]:
     return [(key, path) for key, path in named if _is_path(path) and path != SHIPPED]
 
 
-def _is_path(path: Any) -> bool:
+def _is_path(path: Any) -> TypeGuard[str]:
     return isinstance(path, str) and path.isprintable() and bool(path.strip())

@@ -1,6 +1,7 @@
 """Settings of a training by machine and start: what `train` uses where the caller says nothing else."""
 
 from dataclasses import replace
+from typing import Literal
 
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.policy import Shape
@@ -36,7 +37,7 @@ def task(gpu: bool, threads: int) -> EnvConfig:
 def as_seen_by(task: EnvConfig, shape: Shape) -> EnvConfig:
     """The task for a policy of this shape; one that cannot know its place is compared in the robot's own place."""
     knows = "place" in needed(expanded((*shape.terms, *shape.now)), shape.actions, len(shape.ahead))
-    place = "world" if knows else "own"
+    place: Literal["world", "own"] = "world" if knows else "own"
     return replace(task, observation=shape.seen, ahead=shape.ahead, action=shape.action, place=place)
 
 

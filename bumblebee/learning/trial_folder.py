@@ -109,7 +109,8 @@ def read_kept(folder: Path) -> list[KeptRollout]:
                 "" if pd.isna(row["family"]) else str(row["family"]),
                 str(row["ended"]),
                 float(row["share"]),
-                *(parts[number, side][_COLUMNS].to_numpy(np.float64) for side in _SIDES),
+                robot=parts[number, _SIDES[0]][_COLUMNS].to_numpy(np.float64),
+                motion=parts[number, _SIDES[1]][_COLUMNS].to_numpy(np.float64),
                 fps=float(parts[number, "robot"]["fps"].iloc[0]),
             )
             for number, row in enumerate(trials.to_dict("records"))

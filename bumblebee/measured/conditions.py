@@ -15,7 +15,7 @@ rollouts and change no model.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 MOST = 64  # conditions of a rollout: a person writes them
 LONGEST = 200  # characters of a name or a text
@@ -85,11 +85,16 @@ def _is_added_mass(load: object) -> bool:
     return near and _is_number(load["kg"]) and 0 <= load["kg"] <= HEAVIEST
 
 
+def _added_mass(load: Mapping[str, Any]) -> AddedMass:
+    x, y, z = map(float, load["position"])
+    return AddedMass(load["body"], float(load["kg"]), (x, y, z))
+
+
 def added_masses(meta: Mapping[str, Any]) -> list[AddedMass]:
     """The point masses that a rollout's metadata state."""
     stated = (meta.get("conditions") or {}).get("added_mass", [])
     loads = stated if isinstance(stated, list) else [stated]
-    return [AddedMass(load["body"], float(load["kg"]), tuple(map(float, load["position"]))) for load in loads]
+    return [_added_mass(load) for load in loads]
 
 
 def stated_conditions(meta: Mapping[str, Any], joints: Sequence[str]) -> dict[str, Value]:
@@ -125,5 +130,5 @@ def _is_text(value: object) -> bool:
     )
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST

@@ -17,9 +17,11 @@ SCHEMA = 1
 LONGEST_ID = 200  # bytes: a motion's name with round and cluster before it; file systems take 255 with the ending
 LARGEST = 1e9  # of a rate or gain
 REQUIRED_KEYS = ("schema", "rollout_id", "joints", "control_hz")
-OPTIONAL_KEYS = ("robot", "kp", "kd", "motion", "cluster", "policy", "recorded_at", "operator", "notes")
-OPTIONAL_KEYS += ("compensation",)  # sha256 of what was undone at the joints meanwhile
-OPTIONAL_KEYS += ("conditions",)  # what was different meanwhile, see `measured.conditions`
+OPTIONAL_KEYS = (
+    *("robot", "kp", "kd", "motion", "cluster", "policy", "recorded_at", "operator", "notes"),
+    "compensation",  # sha256 of what was undone at the joints meanwhile
+    "conditions",  # what was different meanwhile, see `measured.conditions`
+)
 
 
 @dataclass(frozen=True)

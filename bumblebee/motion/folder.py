@@ -112,13 +112,13 @@ def _groups(
             yield file.source.path, group
         for ready in file.ready:
             said = say.captions(ready.raw.file, ready.raw.name, _seconds(ready), ready.amass_fps)
-            group = tried(partial(_clips, ready, said, file, config), file.source.path)
-            if isinstance(group, str):
-                heard.skipped.append((name, group))
+            made = tried(partial(_clips, ready, said, file, config), file.source.path)
+            if isinstance(made, str):
+                heard.skipped.append((name, made))
                 continue
             heard.texts.append(said)
             heard.notes += [(name, note) for note in (*ready.raw.notes, *said.notes)]
-            yield file.source.path, group
+            yield file.source.path, made
         if not file.place:
             tell()
 

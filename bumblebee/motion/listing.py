@@ -84,7 +84,7 @@ def _file(source: Source, config: FileConfig) -> Found:
         said = shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
         return Found(source.path, reason=said, data=data)
     if rate_from:
-        found = [replace(raw, rate_from=rate_from) for raw in found]
+        found = [replace(raw, rate_from=rate_from) if isinstance(raw, RawMotion) else raw for raw in found]
     return Found(source.path, tuple(found), data=data, source=source)
 
 

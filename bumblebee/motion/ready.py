@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -114,7 +115,7 @@ def _key(job: Job, config: ReadConfig) -> str:
 def _packed(found: list[Ready | Refused]) -> Arrays:
     """Motions as arrays, what is said of them as JSON in bytes."""
     arrays: Arrays = {}
-    about = []
+    about: list[dict[str, Any]] = []
     for number, one in enumerate(found):
         if isinstance(one, Refused):
             about.append({"refused": one.reason, "part": one.part})
@@ -140,5 +141,5 @@ def _unpacked(arrays: Arrays, path: Path) -> list[Ready | Refused]:
     return found
 
 
-def _named(values: list[np.ndarray]) -> dict[str, np.ndarray]:
+def _named(values: list[np.ndarray]) -> dict[str, Any]:
     return dict(zip(("root_pos", "root_quat", "joint_pos"), values, strict=True))

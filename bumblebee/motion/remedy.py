@@ -1,7 +1,9 @@
 """How a message asks for what a file leaves unsaid: settings that work as they are printed."""
 
+from collections.abc import Mapping
 
-def say(*choices: dict[str, str | float]) -> str:
+
+def say(*choices: Mapping[str, str | float]) -> str:
     """The options of the commands, and the keys of params.yaml, that settle a question.
 
     Args:

@@ -53,7 +53,7 @@ def elbow_figure(elbow: pd.DataFrame, k: int, suggested: int | None) -> str:
     axis.plot(elbow["k"], elbow["within_ss"], "-o", color=INK, ms=4)
     for value, said, shade, size in ((suggested, "the elbow's suggestion", QUIET, 13), (k, "used", colour(0), 9)):
         at = elbow.loc[elbow["k"] == value, "within_ss"]
-        if len(at):
+        if value is not None and len(at):
             label = f"K = {value}: {said}"
             axis.plot([value], [float(at.iloc[0])], "o", ms=size, mfc="none", mec=shade, mew=2, ls="none", label=label)
     axis.set(xlabel="number of clusters K", ylabel="within-cluster sum of squares", ylim=(0, None))

@@ -26,7 +26,7 @@ def success_grid(results: list[dict[str, Any]], policies: dict[str, str], engine
         if entry["policy"] in policies and entry["success"]["value"] is not None
     }
     groups = sorted({group for _, group in entries})
-    rows = [
+    rows: list[tuple[str | Cell, ...]] = [
         (called, *(_cell(entries.get((policy, group)), f"{called}, {group or 'unknown'}") for group in groups))
         for policy, called in policies.items()
         if any((policy, group) in entries for group in groups)

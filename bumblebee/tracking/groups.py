@@ -111,7 +111,7 @@ class Group:
 
     def kept(self) -> dict[str, Tensor]:
         """All that the next look depends on."""
-        kept = {}
+        kept: dict[str, Tensor] = {}
         for index, ring in enumerate(self._rings):
             kept |= {f"ring{index}": ring.ring, f"oldest{index}": ring.oldest}
         return kept

@@ -48,7 +48,7 @@ def _row(one: Tried) -> tuple[str | Cell, ...]:
 
 def _uses(sheet: Sheet) -> Block:
     rules = [*DAMPING, "torque"]
-    rows = [[one.motion, *(_use(one, rule) for rule in rules)] for one in sheet.tried]
+    rows: list[list[str | Cell]] = [[one.motion, *(_use(one, rule) for rule in rules)] for one in sheet.tried]
     caption = (
         "Largest on any robot that did not fall. At 100 % the rule acts; red is beyond. Torque is cut, the others damp."
     )

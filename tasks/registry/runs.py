@@ -5,6 +5,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from tasks.lineage import current_stage, inputs_of_stage, lineage, place
 from tasks.outputs import MANIFEST, copied, manifest
@@ -64,7 +65,8 @@ def log_run(
     written = [RunTag(key, value) for key, value in fitted_tags(labels).items()]
     for kind, entries, most in (("metrics", points, 1000), ("params", settings, 100), ("tags", written, 100)):
         for first in range(0, len(entries), most):
-            client.log_batch(run_id, **{kind: entries[first : first + most]})
+            some: dict[str, Any] = {kind: entries[first : first + most]}
+            client.log_batch(run_id, **some)
     client.log_text(run_id, origin, LINEAGE)
     made = manifest(current_stage()[1] if outputs is None else outputs)
     client.log_text(run_id, as_text(made), MANIFEST)

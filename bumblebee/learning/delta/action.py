@@ -138,7 +138,7 @@ class DeltaAction:
         limit: largest correction [rad].
     """
 
-    def __init__(self, network: torch.nn.Module, joints: tuple[str, ...], limit: float) -> None:
+    def __init__(self, network: torch.nn.Sequential, joints: tuple[str, ...], limit: float) -> None:
         self.network, self.joints, self.limit = network.eval(), tuple(joints), float(limit)
         self._placement = placement(self.joints)
 
@@ -147,6 +147,13 @@ class DeltaAction:
         """Units of the network's hidden layers; none where it is linear."""
         layers = [layer for layer in self.network.modules() if isinstance(layer, torch.nn.Linear)]
         return tuple(layer.out_features for layer in layers[:-1])
+
+    @property
+    def normaliser(self) -> "Normaliser":
+        """The network's first layer."""
+        first = self.network[0]
+        assert isinstance(first, Normaliser)
+        return first
 
     def __call__(self, state: RobotState, targets: Tensor) -> Tensor:
         """Targets (B, J) [rad] with the correction added."""
@@ -189,6 +196,9 @@ def load_delta(folder: Path, promoted_only: bool = True) -> DeltaAction | None:
 
 class Normaliser(torch.nn.Module):
     """Fixed shift and scale of the observation, from the recordings themselves."""
+
+    mean: Tensor
+    std: Tensor
 
     def __init__(self, size: int) -> None:
         super().__init__()

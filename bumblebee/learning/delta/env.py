@@ -51,7 +51,7 @@ class DeltaEnv(VecEnv):
         self._placement = placement(config.joints).to(device)
         facts = joints()
         self._effort = torch.tensor([j.effort_limit for j in facts], device=device)
-        self._range = torch.tensor([j.range for j in facts], device=device).T
+        self._low, self._high = torch.tensor([j.range for j in facts], device=device).T
         self._speed = torch.tensor([j.velocity_limit for j in facts], device=device)
         self._generator = torch.Generator(device).manual_seed(config.seed)
         self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long, device=device)
@@ -91,7 +91,7 @@ class DeltaEnv(VecEnv):
         small = self.config.action_penalty
         total = (
             weight.torque_limits * rewards.beyond(torque, -0.999 * self._effort, 0.999 * self._effort)
-            + weight.dof_pos_limits * rewards.beyond_alone(state.joint_pos, qpos[:, 7:], *self._range, _SLACK)
+            + weight.dof_pos_limits * rewards.beyond_alone(state.joint_pos, qpos[:, 7:], self._low, self._high, _SLACK)
             + weight.dof_vel_limits * rewards.beyond_alone(state.joint_vel, qvel[:, 6:], -self._speed, self._speed)
             + weight.dof_acc * rewards.squared_norm(acceleration)
             + weight.action_rate * small * rewards.squared_norm(delta - self._last)

@@ -93,30 +93,39 @@ def stack(rollouts: Sequence[Rollout], model: mujoco.MjModel) -> Recordings:
 
 
 def _states(rollout: Rollout, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    for column in _NEEDED:
-        if getattr(rollout, column) is None:
-            do = "Log it, or leave the rollout out of the delta stage."
-            raise BadInput(f"{rollout.rollout_id}: column {column}", "a logged column", "none", do)
+    target, quat, spin, speed = (_logged(rollout, column) for column in _NEEDED)
     if other := sorted(set(rollout.joints) ^ set(joint_names())):
         came = f"{len(rollout.joints)} joints, of which {other[0]} is in one alone"
         raise BadInput(f"{rollout.rollout_id}: joints", f"the G1's {len(joint_names())}", came, "Leave it out.")
     order = [rollout.joints.index(name) for name in joint_names()]
     joints = rollout.joint_pos[:, order]
-    turn = Rotation.from_quat(rollout.base_quat, scalar_first=True)
-    velocity_w = turn.apply(rollout.base_lin_vel)
-    position = rollout.base_pos if rollout.base_pos is not None else _odometry(rollout, joints, velocity_w, model)
-    qpos = np.concatenate([position, rollout.base_quat, joints], axis=1)
-    qvel = np.concatenate([velocity_w, rollout.base_ang_vel, rollout.joint_vel[:, order]], axis=1)
-    return qpos, qvel, rollout.joint_target[:, order]
+    turn = Rotation.from_quat(quat, scalar_first=True)
+    velocity_w = turn.apply(speed)
+    position = (
+        rollout.base_pos if rollout.base_pos is not None else _odometry(rollout.time, quat, joints, velocity_w, model)
+    )
+    qpos = np.concatenate([position, quat, joints], axis=1)
+    qvel = np.concatenate([velocity_w, spin, rollout.joint_vel[:, order]], axis=1)
+    return qpos, qvel, target[:, order]
 
 
-def _odometry(rollout: Rollout, joints: np.ndarray, velocity_w: np.ndarray, model: mujoco.MjModel) -> np.ndarray:
+def _logged(rollout: Rollout, column: str) -> np.ndarray:
+    values = getattr(rollout, column)
+    if values is None:
+        do = "Log it, or leave the rollout out of the delta stage."
+        raise BadInput(f"{rollout.rollout_id}: column {column}", "a logged column", "none", do)
+    return values
+
+
+def _odometry(
+    time: np.ndarray, quat: np.ndarray, joints: np.ndarray, velocity_w: np.ndarray, model: mujoco.MjModel
+) -> np.ndarray:
     """Root positions (T, 3) without motion capture: velocity integrated, height such that the lowest sole is at 0."""
-    steps = np.diff(rollout.time)[:, None] * 0.5 * (velocity_w[1:] + velocity_w[:-1])
+    steps = np.diff(time)[:, None] * 0.5 * (velocity_w[1:] + velocity_w[:-1])
     position = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     data = mujoco.MjData(model)
     soles = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name in FEET]
-    data.qpos[2], data.qpos[3:7], data.qpos[7:] = 0.0, rollout.base_quat[0], joints[0]
+    data.qpos[2], data.qpos[3:7], data.qpos[7:] = 0.0, quat[0], joints[0]
     mujoco.mj_kinematics(model, data)
     lowest = min(data.geom_xpos[g, 2] - model.geom_size[g, 0] for g in soles)
     return position - [0.0, 0.0, lowest]

@@ -94,7 +94,7 @@ def fit_delta(
     first = tried[own.nudges[0]]
     scale = torch.maximum(first.missed.abs().median(dim=0).values, _finest(len(recordings.qvel[0]) - 6))
     delta = copy.deepcopy(nothing)
-    delta.network[0].fit(first.seen)
+    delta.normaliser.fit(first.seen)
     systems = {nudge: _system(delta, windows, scale) for nudge, windows in tried.items()}
     (held_out, error, ridge), nudge = min((_cross_validated(system, own), n) for n, system in systems.items())
     system, told = systems[nudge], {"held_out": held_out, "held_out_se": error, "ridge": ridge, "nudge": nudge}
@@ -178,8 +178,8 @@ def replay(
         targets = torch.stack([recordings.targets[own + k] for k in range(steps)]).mean(dim=0)
         before = observe(recorded_state(recordings, own - 1), targets).cpu()
         parts.append((mean, before, ends[0], effect))
-    columns = (torch.cat(own).double() for own in zip(*parts, strict=True))
-    return Windows(*columns, recordings.motion(rows).cpu())
+    shown, before, missed, effect = (torch.cat(own).double() for own in zip(*parts, strict=True))
+    return Windows(shown, before, missed, effect, recordings.motion(rows).cpu())
 
 
 def _cross_validated(system: System, own: RegressionConfig) -> tuple[float, float, float]:
@@ -241,21 +241,27 @@ def _size(system: System) -> float:
 
 def _features(delta: DeltaAction, seen: Tensor) -> Tensor:
     """(N, D + 1) normalised, and 1."""
-    normaliser = delta.network[0]
+    normaliser = delta.normaliser
     scaled = (seen - normaliser.mean.double()) / normaliser.std.double()
     return torch.cat([scaled, torch.ones(len(seen), 1, dtype=scaled.dtype)], dim=1)
 
 
 def _added(delta: DeltaAction, system: System, seen: Tensor) -> System:
     """The problem whose answer is the whole correction, from one around what `delta` corrects already."""
-    layer = delta.network[1]
+    layer = _linear(delta)
     made = _features(delta, seen) @ torch.cat([layer.weight, layer.bias[:, None]], dim=1).double().T
     made = correction(made, delta.limit)
     return replace(system, missed=system.missed + torch.einsum("nma,na->nm", system.effect, made))
 
 
-def _put(delta: DeltaAction, coefficients: Tensor) -> None:
+def _linear(delta: DeltaAction) -> torch.nn.Linear:
     layer = delta.network[1]
+    assert isinstance(layer, torch.nn.Linear)
+    return layer
+
+
+def _put(delta: DeltaAction, coefficients: Tensor) -> None:
+    layer = _linear(delta)
     with torch.no_grad():
         layer.weight.copy_(coefficients[:-1].T)
         layer.bias.copy_(coefficients[-1])

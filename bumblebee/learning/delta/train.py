@@ -30,7 +30,7 @@ def train_delta(
     torch.manual_seed(config.seed)
     with contextlib.redirect_stdout(io.StringIO()):  # rsl_rl prints both networks
         runner = OnPolicyRunner(env, runner_config(config.ppo), log_dir=None, device=env.device)
-    algorithm: BoundedPpo = runner.alg  # type: ignore[assignment]
+    algorithm: BoundedPpo = runner.alg
     _start_at_zero(algorithm.actor.mlp)
     algorithm.train_mode()
     frames_each, rows = config.ppo.steps * config.num_envs, []
@@ -63,10 +63,11 @@ def _collect(env: DeltaEnv, algorithm: BoundedPpo, steps: int) -> tuple[float, f
 
 def _extract(actor: Any, config: DeltaConfig) -> DeltaAction:
     network = make_network(config.ppo.hidden, len(config.joints))
-    network[0].mean.copy_(actor.obs_normalizer._mean[0])
-    network[0].std.copy_(actor.obs_normalizer._std[0] + actor.obs_normalizer.eps)
+    delta = DeltaAction(network, config.joints, config.limit)
+    delta.normaliser.mean.copy_(actor.obs_normalizer._mean[0])
+    delta.normaliser.std.copy_(actor.obs_normalizer._std[0] + actor.obs_normalizer.eps)
     trained = [layer for layer in actor.mlp if isinstance(layer, torch.nn.Linear)]
     empty = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     for source, target in zip(trained, empty, strict=True):
         target.load_state_dict(source.state_dict())
-    return DeltaAction(network, config.joints, config.limit)
+    return delta

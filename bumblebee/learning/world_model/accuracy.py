@@ -41,7 +41,7 @@ def accuracy(model: Dynamics, memory: Memory, ranks: Ranks | None = None) -> Acc
     steps = {name: count for name, count in steps.items() if 0 < count < memory.steps}
     window = memory.held_out_windows(max(steps.values(), default=1))
     predicted = model.unrolled(window.bodies[0], window.targets, window.before, window.context)
-    found = {}
+    found: dict[str, float] = {}
     for name, count in steps.items():
         squares, windows = _squares(predicted, window, count, ranks)
         joints, place, turn = (1e3 * (squares / windows).sqrt()).tolist()

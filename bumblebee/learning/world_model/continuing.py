@@ -65,7 +65,7 @@ class Parent:
             raise BadInput(file, "a trained world model", "no such file")
         try:
             saved = load_checkpoint(file)
-            known = {name: tuple(v) if isinstance(v, list) else v for name, v in saved["frame"].items()}
+            known: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in saved["frame"].items()}
             made = new_model(Frame(**known))
             made.load_state_dict(saved["model"])
         except (KeyError, TypeError, AttributeError, RuntimeError, ValueError) as error:

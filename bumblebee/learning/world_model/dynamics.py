@@ -57,7 +57,7 @@ class Dynamics(nn.Module):
         with torch.no_grad():
             last.weight.mul_(0.1)
             last.bias.zero_()
-        self.layers = nn.Sequential(*layers, last)
+        self.layers: nn.Module = nn.Sequential(*layers, last)
         self.register_buffer("mean", torch.zeros(seen))
         self.register_buffer("std", torch.ones(seen))
         self.register_buffer("scale", torch.ones(12 + 2 * joints))

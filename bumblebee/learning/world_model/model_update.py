@@ -34,7 +34,8 @@ class ModelUpdate:
         """Normalise the model by the first full memory, and let it learn alone for a while."""
         window = self._memory.windows(1, _FIRST)
         columns = (window.bodies[0], window.targets[0], window.before, window.context, window.bodies[1])
-        self.model.normalise(*(column[window.valid[0]] for column in columns), self._ranks)
+        body, target, before, context, after = (column[window.valid[0]] for column in columns)
+        self.model.normalise(body, target, before, context, after, self._ranks)
         for _ in range(self._config.warm_up):
             self()
 

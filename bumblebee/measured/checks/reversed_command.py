@@ -74,7 +74,8 @@ class _Torque:
 
 def _drives(view: View) -> list[int]:
     """The last actuator on each joint, -1 for none."""
-    model, on = view.model, {}
+    model = view.model
+    on: dict[int, int] = {}
     for a in range(model.nu):
         if int(model.actuator_trntype[a]) == int(mujoco.mjtTrn.mjTRN_JOINT):
             on.setdefault(int(model.actuator_trnid[a, 0]), a)

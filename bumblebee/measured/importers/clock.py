@@ -22,11 +22,11 @@ def restarts(stamps: np.ndarray) -> list[int]:
     """
     found, high, before = [], -np.inf, 0
     with np.errstate(all="ignore"):  # stamps without a number are a finding of the checks
-        for row in np.flatnonzero(np.diff(stamps) < 0) + 1:
+        for row in (np.flatnonzero(np.diff(stamps) < 0) + 1).tolist():
             high = max(high, stamps[before:row].max())
             before = row
             if row + 1 < len(stamps) and stamps[row + 1] < high:
-                found.append(int(row))
+                found.append(row)
                 high = -np.inf
     return found
 

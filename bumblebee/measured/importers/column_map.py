@@ -16,7 +16,7 @@ LEFT_OUT = "_"
 """In the place of a joint: this element of the file's vectors is left out. In the place of a joint's command: nobody
 commands it."""
 
-DRIVE = {"kp": "J", "kd": "J", "target_vel": "J", "feed_forward": "J"}
+DRIVE: dict[str, int | str] = {"kp": "J", "kd": "J", "target_vel": "J", "feed_forward": "J"}
 """Columns of a low-level command beside its target: kp [N m/rad], kd [N m s/rad], velocity target [rad/s], feed-forward
 torque [N m]. Constant gains become metadata; the others become part of the target (`drive.py`)."""
 

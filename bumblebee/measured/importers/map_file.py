@@ -61,8 +61,8 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     columns = _columns(f"{path}: columns", table["columns"], kind)
     for column, names in columns.items():
         same_order(f"{path}: columns: {column}", joints, names)
-    given = {"joints": joints, "columns": columns, "time": ("time",), "episode": _one_name(path, table, "episode")}
-    given["valid"] = _one_name(path, table, "valid")
+    given: dict[str, Any] = {"joints": joints, "columns": columns, "time": ("time",)}
+    given |= {key: _one_name(path, table, key) for key in ("episode", "valid")}
     given |= _clock(path, table, kind) | {"hz": _rate(f"{path}: hz", table.get("hz", 0.0))}
     given["angle_unit"] = _angle_unit(f"{path}: angle_unit", table, len(joints))
     given["names"] = _renamed(f"{path}: names", table.get("names"), joints)

@@ -116,7 +116,7 @@ def _row(where: str, number: int, columns: list[str], line: str) -> Row:
     if "#" in caption:
         raise BadInput(where, "a caption without #", repr(caption[:60]), "It separates the parts of a caption's line.")
     since, until = (_time(where, row.get(name, "")) for name in _RANGE)
-    if (since is None) != (until is None) or (until is not None and since >= until):
+    if (since is None) != (until is None) or (since is not None and until is not None and since >= until):
         came = f"{row['from'] or 'nothing'} to {row['to'] or 'nothing'}"
         raise BadInput(where, "both from and to, the earlier first, or neither", came)
     tokens = " ".join(f"{word}/OTHER" for word in words(caption)) or "caption/OTHER"

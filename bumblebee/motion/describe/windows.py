@@ -42,9 +42,9 @@ def _moved(line: str, start: float, end: float) -> str:
     text, tokens, since, until = parse_caption(line)
     if since == until == 0.0:
         return line
-    until = f"{min(until, end) - start:.3f}"
+    ends = f"{min(until, end) - start:.3f}"
     # A moment at the part's very start would read as the whole of it.
-    return "" if float(until) == 0.0 else f"{text}#{tokens}#{max(since - start, 0.0):.3f}#{until}"
+    return "" if float(ends) == 0.0 else f"{text}#{tokens}#{max(since - start, 0.0):.3f}#{ends}"
 
 
 def _describes(since: float, until: float, start: float, end: float, least: float) -> bool:

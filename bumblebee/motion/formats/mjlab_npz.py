@@ -7,6 +7,7 @@ exports it, or it stands before the joints as in MuJoCo's qpos: xyz [m], quatern
 """
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -47,7 +48,8 @@ def read_mjlab_npz(path: Path, arrays: dict[str, np.ndarray], options: RobotConf
     root = root or _bodies(path, arrays, len(joints), ("base_pos_w", "base_quat_w"))
     if bodies is not None and root is not None and not body_orders(bodies[0].shape[1]):
         bodies = None  # the root is known without them
-    order, said_by = options.quaternion or "wxyz", "known" if options.quaternion else ""
+    order: str = options.quaternion or "wxyz"
+    said_by: Literal["", "file", "known"] = "known" if options.quaternion else ""
     if bodies is None:
         if root is None:
             came = ", ".join(sorted(arrays)[:12])[:160]

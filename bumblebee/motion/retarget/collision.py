@@ -91,8 +91,8 @@ def _shapes(robot: Robot) -> Shapes:
             ends = model.geom_pos[geom] + np.stack([-axis, axis])
             rows.append((body, ends, float(model.geom_size[geom, 0]), False))
     rows += [_foot(robot, side) for side in range(2)]
-    body, ends, radius, foot = zip(*rows, strict=True)
-    return Shapes(np.array(body), np.array(ends), np.array(radius), np.array(foot))
+    bodies, places, radii, soles = zip(*rows, strict=True)
+    return Shapes(np.array(bodies), np.array(places), np.array(radii), np.array(soles))
 
 
 def _foot(robot: Robot, side: int) -> tuple[int, np.ndarray, float, bool]:
@@ -126,7 +126,8 @@ def _near(ends: np.ndarray, kept: Obstacles, margin: float) -> tuple[np.ndarray,
     reach = kept.shapes.radius + np.linalg.norm(kept.shapes.ends[:, 1] - kept.shapes.ends[:, 0], axis=1) / 2
     first, second = kept.pairs.T
     gap = centre[:, first] - centre[:, second]
-    return np.nonzero(_dot(gap, gap) < (reach[first] + reach[second] + margin) ** 2)
+    frames, pairs = np.nonzero(_dot(gap, gap) < (reach[first] + reach[second] + margin) ** 2)
+    return frames, pairs
 
 
 def _between(ends: np.ndarray, shapes: Shapes, pairs: np.ndarray) -> np.ndarray:

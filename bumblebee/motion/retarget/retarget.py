@@ -109,9 +109,8 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
     for after in parts[1:]:
         share = np.linspace(0, 1, _OVERLAP)[:, None]
         share = share * share * (3 - 2 * share)
-        turn = quaternions.slerp(
-            *(quaternions.from_matrices(t) for t in (whole.turn[-_OVERLAP:], after.turn[:_OVERLAP])), share[:, 0]
-        )
+        first, second = (quaternions.from_matrices(t) for t in (whole.turn[-_OVERLAP:], after.turn[:_OVERLAP]))
+        turn = quaternions.slerp(first, second, share[:, 0])
         middle = Trajectory(
             (1 - share) * whole.root[-_OVERLAP:] + share * after.root[:_OVERLAP],
             quaternions.to_matrices(turn),

@@ -43,9 +43,9 @@ class Targets:
 
     def part(self, start: int, end: int) -> "Targets":
         """The frames from `start` to before `end`."""
-        arrays = (self.segments, self.hips, self.feet, self.contact, self.frame, self.floor)
-        posture = None if self.posture is None else self.posture[start:end]
-        return Targets(self.fps, *(array[start:end] for array in arrays), posture)
+        own, posture = slice(start, end), None if self.posture is None else self.posture[start:end]
+        pose = (self.segments[own], self.hips[own], self.feet[own])
+        return Targets(self.fps, *pose, self.contact[own], self.frame[own], self.floor[own], posture)
 
     def near(self, robot: Robot) -> np.ndarray:
         """Joint angles (T, n) [rad] that a robot stays near."""

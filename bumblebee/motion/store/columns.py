@@ -1,6 +1,7 @@
 """A clip's arrays as columns of one table, a row a frame."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ def table_of(clip: Clip) -> np.ndarray:
     return np.concatenate([clip.root_pos, clip.root_quat, clip.joint_pos, keys], axis=1, dtype=np.float32)
 
 
-def arrays_of(table: np.ndarray) -> dict[str, np.ndarray]:
+def arrays_of(table: np.ndarray) -> dict[str, Any]:
     """The fields of `Clip` that are arrays, from such a table (T, 72); each is a copy."""
     root_pos, root_quat, joint_pos, key_pos = np.split(table, [3, 7, 7 + len(joint_names())], axis=1)
     key_pos = key_pos.reshape(-1, len(KEY_BODIES), 3)

@@ -52,13 +52,6 @@ class Memory:
     """(n, H): z of Dahl's law on the H joints that have it."""
 
 
-# Fields of the model that are written, and the attributes that show them.
-WRITTEN = {
-    "dof_frictionloss": "_loss",
-    "actuator_gainprm": "_gain",
-    "actuator_biasprm": "_bias",
-    "actuator_forcerange": "_range",
-}
 # What is carried from step to step: saved, and on a GPU kept in place. tests/test_forgotten.py finds what is missing.
 _REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent", "setpoint", "pace")
 
@@ -102,28 +95,21 @@ class StepHooks:
         self._rubbing = hooks.has("loss") or any(term.rubs for term in terms)
         self._driving = any(term.drives for term in terms)
         self._pushing = self._late or self._shaping or hooks.has("torque") or any(not term.rubs for term in terms)
-        if self._fading:
-            self._expand("actuator_gainprm", "actuator_biasprm")
-        if self._rubbing:
-            self._expand("dof_frictionloss")
-        if self._running_out:
-            self._expand("actuator_forcerange")
+        fields = ["actuator_gainprm", "actuator_biasprm"] * self._fading
+        fields += ["dof_frictionloss"] * self._rubbing + ["actuator_forcerange"] * self._running_out
+        # Fields of the model that are written, with a row for each world.
+        self._written: dict[str, np.ndarray] = {name: batch.expand(name) for name in fields}
         self.rebase(("dof_frictionloss", "actuator_gainprm", "actuator_biasprm"))
-
-    def _expand(self, *names: str) -> None:
-        """Take fields of the model that have a row for each world, to write to."""
-        for name in names:
-            setattr(self, WRITTEN[name], self._batch.expand(name))
 
     def rebase(self, fields: Iterable[str]) -> None:
         """Take the worlds' present values of some fields (randomised ones, say) as those that the hooks act upon."""
         for name in fields:
             if name == "dof_frictionloss" and self._rubbing:
-                self._loss0 = self._loss[:, self.servos.dof].copy()
+                self._loss0 = self._written[name][:, self.servos.dof].copy()
             elif name == "actuator_gainprm" and self._fading:
-                self._gain0 = self._gain.copy()
+                self._gain0 = self._written[name].copy()
             elif name == "actuator_biasprm" and self._fading:
-                self._bias0 = self._bias.copy()
+                self._bias0 = self._written[name].copy()
 
     def reset(self, ids: np.ndarray, memory: Memory | None = None) -> None:
         """Worlds `ids` (n,) begin anew, with a memory (n worlds) or at rest."""
@@ -195,7 +181,7 @@ class StepHooks:
             share = h.load_friction[:, 0] + 0.5 * h.load_friction[:, 1] * np.tanh(v / _AT_REST)
             extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + np.maximum(share, 0.0) * np.abs(torque)
             loss = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
-            self._loss[:, servos.dof] = np.maximum(loss, 0.0)
+            self._written["dof_frictionloss"][:, servos.dof] = np.maximum(loss, 0.0)
         if self._pushing:
             applied = torque - now + self._discovered(q, v, u, torque, rubs=False)
             if self._driving:
@@ -258,8 +244,8 @@ class StepHooks:
         strength = np.maximum(1.0 - h.drift * self._time[:, None] - h.thermal * self._heat, 0.0)
         has = servos.actuator >= 0
         a = servos.actuator[has]
-        self._gain[:, a, 0] = strength[:, has] * self._gain0[:, a, 0]
-        self._bias[:, a, :3] = strength[:, has, None] * self._bias0[:, a, :3]
+        self._written["actuator_gainprm"][:, a, 0] = strength[:, has] * self._gain0[:, a, 0]
+        self._written["actuator_biasprm"][:, a, :3] = strength[:, has, None] * self._bias0[:, a, :3]
         return strength
 
     def _torque_limit(self, v: np.ndarray) -> np.ndarray:
@@ -270,7 +256,8 @@ class StepHooks:
         left = np.clip(1.0 - np.abs(v) / (speed * servos.supply), 0.0, 1.0)
         forward, backward = np.where(v > 0, left, 1.0), np.where(v < 0, left, 1.0)
         a, force = servos.actuator[some], (servos.limit / np.maximum(np.abs(servos.gear), 1e-12))[..., some]
-        self._range[:, a, 0], self._range[:, a, 1] = -force * backward[:, some], force * forward[:, some]
+        written = self._written["actuator_forcerange"]
+        written[:, a, 0], written[:, a, 1] = -force * backward[:, some], force * forward[:, some]
         return np.where(some, servos.limit * left, servos.limit)
 
     def _delayed(

@@ -70,10 +70,10 @@ class State:
         rate, period = self.numbers
         reaches = rate * period * np.diff(np.floor((clock + _EPS) / period), prepend=-1.0)
         if v.ndim == 1:
-            now, wanted = float(u[0]), u.tolist()
+            at, targets = float(u[0]), u.tolist()
             for k, reach in enumerate(reaches.tolist()):
-                out[k] = now
-                now += min(max(wanted[k] - now, -reach), reach)
+                out[k] = at
+                at += min(max(targets[k] - at, -reach), reach)
             return out
         now, most = u[..., 0].copy(), np.moveaxis(reaches, -1, 0).copy()
         step, least = np.empty_like(now), -most

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from bumblebee.sim.device_arrays import DeviceArray
-from bumblebee.sim.effects.forces import _REMEMBERED, WRITTEN, StepHooks
+from bumblebee.sim.effects.forces import _REMEMBERED, StepHooks
 from bumblebee.sim.effects.hooks import RuntimeHooks
 from bumblebee.sim.effects.terms import Term, _value
 
@@ -94,9 +94,8 @@ class WarpHooks(StepHooks):
 
     def refresh(self, fields: Iterable[str]) -> None:
         """Some fields of the model have new arrays: write into those, on top of their values."""
-        for name in set(fields) & set(WRITTEN):
-            if hasattr(self, WRITTEN[name]):
-                setattr(self, WRITTEN[name], self._batch.expand(name))
+        for name in set(fields) & set(self._written):
+            self._written[name] = self._batch.expand(name)
         self.rebase(fields)
 
     def _put_back(self) -> None:

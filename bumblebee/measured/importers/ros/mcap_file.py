@@ -126,7 +126,7 @@ class _Found:
                 self.others[channel.topic] = kind
             return
         encodings = (channel.message_encoding, schema.encoding if schema else "none")
-        if encodings != ("cdr", "ros2msg"):
+        if schema is None or encodings != ("cdr", "ros2msg"):
             came = f"{encodings[0]} by {encodings[1]}"[:80]
             raise BadInput(f"{self.where}: {channel.topic}", "ROS 2 messages (cdr by ros2msg)", came)
         self.topics.setdefault(channel.topic, Topic(kind, schema.data.decode()))

@@ -39,10 +39,10 @@ def series_of(where: str, name: str, topic: Topic, wanted: list[Wanted], chosen:
     for one in (one for one in wanted if NAMED[one.column] == "J" and one.part == _WHOLE):
         _require_joints(f"{where}: {one.column}", parts, chosen)
     series = [
-        one
+        made
         for part in parts
         for number in range(len(wanted))
-        if (one := _series(f"{where}, message {part.first}", name, topic.kind, part, number, wanted, chosen))
+        if (made := _series(f"{where}, message {part.first}", name, topic.kind, part, number, wanted, chosen))
     ]
     return [replace(series[0], notes=notes), *series[1:]]
 
