@@ -18,7 +18,7 @@ def test_of_many_joints_with_friction_the_worst_are_asked(
     monkeypatch.setattr(rubbing_joints, "restless", lambda small, white, left, count: WORST_FIRST[:count])
     run = SimpleNamespace(
         problem=SimpleNamespace(thresholds=Thresholds(), plant=SimpleNamespace(joints=[""] * 30)),
-        answers=SimpleNamespace(white=None),
+        white=None,
         small=None,
         small_fit=lambda: SimpleNamespace(clean=lambda problem: None),
         config=SearchConfig(),
