@@ -30,8 +30,8 @@ class DiagnoseConfig(Ranged):
     report_windows: Windows = 80
     """Windows for each horizon of the error block."""
     search_seconds: Annotated[float, Range(above=0, most=1e6)] = 600.0
-    """Processor time after which the search for effects begins nothing new [s], for up to 12 degrees of freedom and in proportion
-    longer for more; what was found by then is fitted and reported, and a note says that time ran out."""
+    """Processor time after which the search for effects begins nothing new [s], for up to 12 degrees of freedom and in
+    proportion longer for more; what was found by then is fitted and reported, and a note says that time ran out."""
     beyond_seconds: Annotated[float, Range(above=0, most=1e6)] = 100.0
     """Processor time of the search for what is in no catalogue [s]."""
     seed: Seed = 0

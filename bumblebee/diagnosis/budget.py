@@ -38,7 +38,5 @@ class Budget:
         """A line on what was left out; none where nothing was."""
         if not self.left_out:
             return []
-        return [
-            f"the search {self.search} ended at its limit of {self.seconds:.0f} s of processor time (`{self.setting}`); not tried: "
-            + "; ".join(self.left_out)
-        ]
+        ended = f"the search {self.search} ended at its limit of {self.seconds:.0f} s of processor time"
+        return [f"{ended} (`{self.setting}`); not tried: " + "; ".join(self.left_out)]

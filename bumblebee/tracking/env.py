@@ -85,7 +85,7 @@ class TrackingEnv(VecEnv):
         self.ground = Ground(config.terrain, n, device) if config.terrain.rough else None
         wanted = {"policy": config.observation} | ({"student": config.student} if config.student.terms else {})
         sizes, noise = (n, j, len(library.ahead)), config.observation_noise
-        self.errors = SensorErrors(config.sensors, engine.model, n, device) if config.sensors.any else None
+        self.errors = SensorErrors(config.sensors, n, device) if config.sensors.any else None
         last = (noise, device, config.compile, self.errors)
         self.groups = {name: Group(own, sizes, *last) for name, own in wanted.items()}
         self._critic = expanded(config.critic)

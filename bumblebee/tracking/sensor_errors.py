@@ -10,11 +10,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import mujoco
 import torch
 from torch import Tensor
 
-from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.robot.facts import KEY_BODIES, joint_names
+from bumblebee.robot.model import build_model
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, from_rotation_vector, multiply, rotate
 from bumblebee.tracking.config import SensorConfig
@@ -29,13 +29,12 @@ class SensorErrors:
 
     Args:
         config: their largest values.
-        model: the robot, for the key bodies that follow from the encoders.
         worlds: B.
         device: where the robots' states are.
     """
 
-    def __init__(self, config: SensorConfig, model: mujoco.MjModel, worlds: int, device: torch.device) -> None:
-        joints = model.njnt - 1
+    def __init__(self, config: SensorConfig, worlds: int, device: torch.device) -> None:
+        joints = len(joint_names())
         most = [config.encoder_offset] * joints + [config.imu_offset] * 3 + [config.gyro_bias] * 3
         self.most = torch.tensor(most, dtype=torch.float32, device=device)
         """(J + 6,) largest value of each error that stays."""
@@ -44,7 +43,7 @@ class SensorErrors:
         self.now = torch.zeros(worlds, joints + 6 + self._drift, device=device)
         """(B, J + 6): joints' offsets [rad], rotation vector from base to IMU [rad], bias of the gyro [rad/s]; where
         odometry drifts (B, J + 10): its error of scale, error of heading [rad] and shift in the plane [m] too."""
-        self._kinematics = ForwardKinematics(model, list(KEY_BODIES), device)
+        self._kinematics = ForwardKinematics(build_model(), list(KEY_BODIES), device)
 
     def draw(self, robots: int, generator: torch.Generator | None = None) -> Tensor:
         """Errors (robots, E) at an episode's start, those that stay uniform to both sides."""

@@ -13,7 +13,8 @@ from torch import Tensor
 from bumblebee.learning.world_model.body import joint_pos, unpacked
 from bumblebee.learning.world_model.dynamics import Dynamics, handed_on
 from bumblebee.learning.world_model.memory import Starts
-from bumblebee.robot.facts import FEET, KEY_BODIES
+from bumblebee.robot.facts import FEET, KEY_BODIES, joint_names
+from bumblebee.robot.model import build_model
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.servo import servos_of
 from bumblebee.tracking.env import TrackingEnv
@@ -69,8 +70,9 @@ class Imagination:
         every = (*env.cfg.observation.terms, *env.cfg.observation.now, *env.cfg.critic)
         self.value_size = sum(size for _, size in parts(every, env.num_actions, len(env.library.ahead)))
         """V, what the value sees: the policy's observation without noise, and the task's terms for the critic."""
-        self.kinematics = ForwardKinematics(env.engine.model, [*KEY_BODIES, *FEET], device)
-        servos = servos_of(env.engine.model, list(range(1, env.engine.model.njnt)))
+        # Of the declared robot: a corrected model may have further hinges, which no state holds.
+        self.kinematics = ForwardKinematics(build_model(), [*KEY_BODIES, *FEET], device)
+        servos = servos_of(env.engine.model, [env.engine.model.joint(name).id for name in joint_names()])
         columns = (servos.gain, servos.bias[:, 2], servos.limit)
         self._kp, self._kd, self._limit = (torch.tensor(c, dtype=torch.float32, device=device) for c in columns)
         self._ahead = torch.arange(1, horizon + 2, device=device)

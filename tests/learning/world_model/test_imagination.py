@@ -13,16 +13,21 @@ from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory, Starts
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.sim.effects import single
 from bumblebee.sim.engine_choice import make_engine
-from bumblebee.tracking.config import EnvConfig, ObservationConfig, Randomisation
+from bumblebee.tracking.config import EnvConfig, ObservationConfig, Randomisation, SensorConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.mirror import augmentation
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.terms import see
 from tests.learning.tiny import env_of
+from tests.sim.test_effect_engine import engine_with
 
 WORLDS, STEPS = 8, 60
+NEITHER_KNEE = [i for i, name in enumerate(KEY_BODIES) if not name.startswith(("left_knee", "left_ankle"))]
+"""Key bodies that a spring in the left knee does not carry: of these encoders tell the place."""
 
 
 CONFIG = EnvConfig(
@@ -101,6 +106,20 @@ def test_the_reward_has_gradients_with_respect_to_the_state_also_at_the_referenc
     step = imagination.step(state, body, imagination.targets(ref, still), (still, still, still), ref)
     (gradient,) = torch.autograd.grad(env.reward(step).sum(), body)
     assert torch.isfinite(gradient).all() and gradient.abs().sum() > 0
+
+
+@pytest.mark.parametrize("encoder", [0.0, 1.0])
+def test_key_bodies_and_servos_are_the_robots_own_where_its_corrected_model_has_a_hinge_more(encoder: float) -> None:
+    """A spring in the left knee; joints after it keep their places, and all of them their gains."""
+    config = replace(CONFIG, sensors=SensorConfig(encoder_offset=0.02))
+    engine = engine_with(single("series_elasticity", "left_knee_joint", 200.0, encoder), worlds=WORLDS)
+    env = TrackingEnv(MotionLibrary(make_library(EmbeddedConfig(limit=2)), config.ahead), engine, config, seed=3)
+    imagination, state = Imagination(env, horizon=1), env.now[0]
+    assert engine.model.njnt == 25
+    assert (imagination._kp > 0).all() and len(imagination._kp) == env.num_actions
+    seen = imagination.state(packed(state))[0].key_pos_w
+    torch.testing.assert_close(seen[:, NEITHER_KNEE], state.key_pos_w[:, NEITHER_KNEE], atol=1e-4, rtol=0)
+    assert env.errors is not None and env.errors.now.shape == (WORLDS, env.num_actions + 6)
 
 
 def test_servos_torques_are_those_of_the_engine_where_it_holds_still(env: TrackingEnv) -> None:
