@@ -37,11 +37,27 @@ def started(options: argparse.Namespace) -> int:
         try:
             require_port("--prefect-port", options.prefect_port)
             require_port("--mlflow-port", options.mlflow_port)
-            folder = options.workspace or choose(options.name, options.profile, options.motions, options.seed)
-            return run(folder, options.prefect_port, options.mlflow_port, options.verbose)
+            return run(folder_of(options), options.prefect_port, options.mlflow_port, options.verbose)
         except KeyboardInterrupt:
             print("stopped; the same command continues after the last finished stage", file=sys.stderr)
             return EXIT_INTERRUPTED
+
+
+def folder_of(options: argparse.Namespace) -> Path:
+    """The workspace that the options name, or ask for.
+
+    Raises:
+        BadInput: `--workspace` with an option that would change it.
+    """
+    asked = (options.name, options.profile, options.motions, options.seed)
+    if options.workspace is None:
+        return choose(*asked)
+    if any(asked):
+        names = ("--name", "--profile", "--motions", "--seed")
+        came = ", ".join(name for name, value in zip(names, asked, strict=True) if value)
+        do = f"Leave one out, or change {options.workspace / 'params.yaml'}."
+        raise BadInput("--workspace", "a workspace as it is", f"{came} beside it", do)
+    return Path(options.workspace)
 
 
 def parser() -> argparse.ArgumentParser:
