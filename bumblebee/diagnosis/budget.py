@@ -1,7 +1,7 @@
 """Soft limit of a search in processor time: running steps finish, later ones are skipped and listed.
 
-The processor's time and not the clock's, of all threads: what is found depends neither on what else the machine does,
-nor on how many cores it has.
+The processor's time and not the clock's, of all threads: other programs do not shorten a search, and more cores do not
+lengthen it. Near the limit results may still differ from run to run.
 """
 
 import time
