@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 
 from bumblebee.errors import BadInput, plain
+from bumblebee.io.there import require_motions
+from bumblebee.learning.pretrained import require_policy
 
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
 Settings = Annotated[
@@ -30,6 +32,7 @@ def train(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a policy of an earlier training.")] = False,
 ) -> None:
     """Train a policy on a folder of motions. Stopped, the same command goes on from its last checkpoint."""
+    require_motions(folder)
     from dataclasses import asdict
 
     from bumblebee.api.policy_card import splits, tried
@@ -78,6 +81,9 @@ def evaluate(
     settings: Settings = None,
 ) -> None:
     """Let a policy follow motions in MuJoCo, and print how many it follows and how closely."""
+    require_policy(policy)
+    if motions != "embedded":
+        require_motions(Path(motions))
     from bumblebee.api.motions import EMBEDDED, read_motions
     from bumblebee.api.policies import evaluate as run
     from bumblebee.api.policies import load_policy

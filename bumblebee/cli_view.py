@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bumblebee.errors import BadInput
+from bumblebee.learning.pretrained import require_seen
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
@@ -47,6 +48,7 @@ def view(
     ticks: Ticks = None,
 ) -> None:
     """Show motions, a policy live, an evaluation, or measured rollouts beside their simulation, in the browser."""
+    require_seen(path)
     if out is not None:
         _claim(out, [given for given in (path, motions, model, effects) if given])
     from bumblebee.view.shipped import at_hand

@@ -136,7 +136,7 @@ def profile_path(profile: str) -> Path:
     """The file of a profile."""
     path = HOME / "profiles" / f"{profile}.yaml"
     if not path.exists():
-        known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml")))
+        known = ", ".join(sorted(file.stem for file in (HOME / "profiles").glob("*.yaml")))
         raise BadInput(path, f"one of the profiles {known}", profile)
     return path
 

@@ -40,6 +40,15 @@ def test_the_list_of_commands_imports_neither_numbers_nor_networks():
     assert subprocess.run([sys.executable, "-c", code], cwd=HOME, capture_output=True, check=False).returncode == 0
 
 
+@pytest.mark.parametrize("line", ["train nowhere", "evaluate nowhere", "evaluate shipped nowhere", "view nowhere"])
+def test_a_path_that_is_not_there_is_refused_before_anything_slow_is_imported(line):
+    code = f"import sys\nfrom bumblebee import cli\nsys.argv[1:] = {line.split()!r}\ntry:\n    cli.main()\n"
+    code += "finally:\n    print({'numpy', 'torch', 'mujoco', 'pandas'} & set(sys.modules))"
+    told = subprocess.run([sys.executable, "-c", code], cwd=HOME, capture_output=True, text=True, check=False)
+    assert (told.returncode, told.stdout) == (2, "set()\n"), told.stderr
+    assert "nowhere: expected " in told.stderr and told.stderr.count("\n") == 1
+
+
 def test_without_a_command_all_are_listed(capsys):
     assert run() == 0
     said = capsys.readouterr().out

@@ -13,12 +13,12 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
+from bumblebee.learning.pretrained import NO_POLICY
 from bumblebee.learning.transformer import TransformerConfig, TransformerModel
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
 
 FILE = "policy.pt"
-_NONE = "Train it first, or take one that comes along: shipped, randomised, imu."
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def load_policy(folder: Path) -> Policy:
         actor = new_actor(shape)
         actor.load_state_dict(weights)
     except FileNotFoundError:
-        raise BadInput(path, "a trained policy", "no file", _NONE) from None
+        raise BadInput(path, "a trained policy", "no file", NO_POLICY) from None
     except Exception as error:
         raise BadInput(path, "a checkpoint of a policy", str(error).splitlines()[0]) from None
     return Policy(actor, content["critic"], shape)

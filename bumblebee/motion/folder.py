@@ -10,6 +10,7 @@ import pandas as pd
 
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
+from bumblebee.io.there import require_motions
 from bumblebee.motion.captions import family_of
 from bumblebee.motion.checks import check_clip
 from bumblebee.motion.clip import Clip
@@ -69,8 +70,7 @@ def read_each(
 ) -> Reading:
     """Read more motions than memory holds: `take` gets one clip after the other, and the reading has none."""
     path, config = Path(path), config or ReadConfig()
-    if not os.path.lexists(path):
-        raise BadInput(path, "a folder with motion files, or a motion file", "no such folder or file")
+    require_motions(path)
     config.require_skeleton()
     say, heard = describer(config.describe, path), _Heard()
     count = 0

@@ -11,4 +11,4 @@ def say(*choices: Mapping[str, str | float]) -> str:
     """
     options = " or ".join(" ".join(f"--set {key}={value}" for key, value in settings.items()) for settings in choices)
     keys = dict.fromkeys(key for settings in choices for key in settings)
-    return f"Say it: {options} (params.yaml: {', '.join(f'motions.read.{key}' for key in keys)})."
+    return f"Say it: {options} (for the loop, in params.yaml: {', '.join(f'motions.read.{key}' for key in keys)})."

@@ -7,9 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.errors import BadInput
 from bumblebee.learning.export import export_shipped
-from bumblebee.learning.pretrained import SHIPPED
+from bumblebee.learning.pretrained import require_seen
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import Kind, kinds
 from bumblebee.view.live import LivePolicy
@@ -32,12 +31,10 @@ def at_hand(path: Path) -> Iterator[Path]:
     Raises:
         BadInput: nothing lies there, and no policy has the name.
     """
-    if os.path.lexists(path):  # False for a name that the system refuses, too
+    require_seen(path)
+    if os.path.lexists(path):
         yield path
         return
-    if str(path) not in SHIPPED:
-        expected = f"a path, or a policy that comes along: {', '.join(SHIPPED)}"
-        raise BadInput(path, expected, "no such file or folder", "docs/viewing.md says what can be seen.")
     with tempfile.TemporaryDirectory() as folder:
         yield export_shipped(Path(folder) / path, str(path))
 

@@ -90,7 +90,7 @@ ASKED: dict[str, tuple[Callable[[Motions], Path], tuple[str, ...]]] = {
 
 def choices(said: str) -> list[list[str]]:
     """The options that a message offers, one list for each answer."""
-    offered = re.search(r"Say it: (.*?) \(params\.yaml: ([\w., ]+)\)\.", said)
+    offered = re.search(r"Say it: (.*?) \(for the loop, in params\.yaml: ([\w., ]+)\)\.", said)
     assert offered, said
     keys = set(re.findall(r"--set (\w+)=", offered[1]))
     assert set(offered[2].split(", ")) == {f"motions.read.{key}" for key in keys}
@@ -148,7 +148,7 @@ def test_a_known_set_that_is_not_read_says_what_it_is_and_how_to_save_it(motions
     assert run("inspect", path) == 2
     said = capsys.readouterr().err
     assert f"came {kind}" in said and said.count("\n") == 1
-    named = dict(re.findall(r"(\w+)=([\w/]+)", said.partition(".npz with ")[2].partition("(params")[0]))
+    named = dict(re.findall(r"(\w+)=([\w/]+)", said.partition(".npz with ")[2].partition("(for the loop")[0]))
     options = ["--set", f"up={named.pop('up')}"] if "up" in named else []
     arrays = {name: eval(expression, {}, dict(fields)) for name, expression in named.items()}
     assert run("inspect", saved(tmp_path / "saved.npz", **arrays), *options) == 0

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from bumblebee.io.there import require_there
+
 FOLDER = Path(__file__).parent
 """A policy's folder, as `load_policy` reads it."""
 RANDOMISED = FOLDER / "randomised"
@@ -16,3 +18,17 @@ MOTIONS = {FOLDER: _REAL, RANDOMISED: f"{_REAL}, {_CMU}", IMU: f"{_REAL}, {_CMU}
 """Real motions that each has learnt from, with licences that whatever goes on from its weights keeps."""
 SHIPPED = {"shipped": FOLDER, "randomised": RANDOMISED, "imu": IMU}
 """Names by which a user asks for them."""
+NO_POLICY = f"Train it first, or take one that comes along: {', '.join(SHIPPED)}."
+
+
+def require_policy(name: str) -> None:
+    """`BadInput` where `name` is neither a policy that comes along nor a folder."""
+    if name not in SHIPPED:
+        require_there(Path(name).expanduser(), "a trained policy", NO_POLICY)
+
+
+def require_seen(path: Path) -> None:
+    """`BadInput` where nothing lies at `path`, and no policy that comes along has the name."""
+    if str(path) not in SHIPPED:
+        expected = f"a path, or a policy that comes along: {', '.join(SHIPPED)}"
+        require_there(path, expected, "docs/viewing.md says what can be seen.")
