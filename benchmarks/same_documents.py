@@ -87,7 +87,13 @@ def _plain(value: object) -> object:
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
-def _write(job: Case | Path, policy: Path | None, out: Path) -> str:
+def single_threads() -> None:
+    """One thread a process, of those that are yet to be started."""
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[variable] = "1"
+
+
+def write(job: Case | Path, policy: Path | None, out: Path) -> str:
     part = out / f"{name_of(job)}.part"
     part.write_text(document(job, policy))
     part.rename(part.with_suffix(".json"))
@@ -101,10 +107,7 @@ def main(argv: list[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("out", type=Path, nargs="?", help="folder of the results")
-    parser.add_argument("--policy", type=Path, help="folder of an exported policy, for the G1 that tracks motions")
-    parser.add_argument("--dataset", type=Path, nargs="*", default=[], help="real datasets beside the sample")
-    parser.add_argument("--workers", type=int, default=1, help="processes, one core each")
+    add_options(parser)
     parser.add_argument("--compare", type=Path, nargs=2, metavar=("BEFORE", "AFTER"), help="two folders of results")
     options = parser.parse_args(argv)
     try:
@@ -121,17 +124,28 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def run(options: argparse.Namespace) -> None:
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of a run of the sample."""
+    parser.add_argument("out", type=Path, nargs="?", help="folder of the results")
+    parser.add_argument("--policy", type=Path, help="folder of an exported policy, for the G1 that tracks motions")
+    parser.add_argument("--dataset", type=Path, nargs="*", default=[], help="real datasets beside the sample")
+    parser.add_argument("--workers", type=int, default=1, help="processes, one core each")
+
+
+def left(options: argparse.Namespace) -> list[Case | Path]:
     """Every case and dataset that is not there yet."""
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[variable] = "1"
-    options.out.mkdir(parents=True, exist_ok=True)
     if options.policy is None:
         print("no --policy: the G1 that tracks motions is left out")
     jobs = [*options.dataset, *(case for case in sample() if options.policy or case.robot != "track")]
-    jobs = [job for job in jobs if not (options.out / f"{name_of(job)}.json").exists()]
+    return [job for job in jobs if not (options.out / f"{name_of(job)}.json").exists()]
+
+
+def run(options: argparse.Namespace) -> None:
+    """Diagnose what is left, a process a document."""
+    single_threads()
+    options.out.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(options.workers) as pool:
-        done = [pool.submit(_write, job, options.policy, options.out) for job in jobs]
+        done = [pool.submit(write, job, options.policy, options.out) for job in left(options)]
         for future in as_completed(done):
             print(future.result(), flush=True)
 
