@@ -35,7 +35,7 @@ _COMPARE = {np.less: operator.lt, np.less_equal: operator.le, np.greater: operat
 _CHOOSE = (np.minimum, np.maximum, np.fmin, np.fmax)
 _ARITHMETIC = ("add", "sub", "mul", "truediv", "floordiv", "pow", "mod")
 counts: Counter[tuple[str, str]] = Counter()
-"""Of this process, by number and column."""
+"""Counts of this process, by number and column."""
 
 
 def carried(value: object) -> bool:

@@ -5,8 +5,6 @@ Status 0: done, 2: unusable input or output, 1: an internal error; one line on s
 
 import shlex
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +14,7 @@ from bumblebee import __version__
 from bumblebee.commands import COMMANDS, Commands, missing
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
+from bumblebee.teller import Teller
 
 _EPILOG = "`bumblebee COMMAND --help` explains a command; docs/commands.md has an example of each."
 # Plain text for the list of commands: importing `rich` would take longer than all the rest of it.
@@ -58,9 +57,16 @@ def diagnose(
     max_windows: Annotated[
         int | None, typer.Option(min=8, help="Windows that take part in the fit; 120, and 40 with --quick.")
     ] = None,
+    minutes: Annotated[
+        float | None,
+        typer.Option("--minutes", min=0.1, max=10_000, help="Time for all of it [min]."),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the perturbed starts.")] = 0,
 ) -> None:
-    """Find which effect the model lacks, add it, and report the error before and after."""
+    """Find which effect the model lacks, add it, and report the error before and after.
+
+    Ctrl-C, or SIGTERM, ends the search and writes what it has found; a second one ends the process.
+    """
     from bumblebee.diagnosis.config import DiagnosisConfig
     from bumblebee.diagnosis.dataset import open_session, read_held_out
     from bumblebee.diagnosis.diagnose import diagnose
@@ -68,6 +74,8 @@ def diagnose(
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
     from bumblebee.diagnosis.quick import QuickConfig, first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
+    from bumblebee.diagnosis.simulation import Stop
+    from bumblebee.first_signal import first_signal
     from bumblebee.report.windows import windows_inlay
     from bumblebee.sim.quiet import quiet_mujoco
 
@@ -79,14 +87,26 @@ def diagnose(
         work = QuickConfig() if max_windows is None else QuickConfig(windows=max_windows)
         session = open_session(model, dataset, None, held_out)
         whole = shlex.join(["bumblebee", "diagnose", str(model), str(dataset), "--out", "found"])
-        print(plain(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller()), whole)))
+        with Teller() as say:
+            seen = first_look(session, DiagnosisConfig(seed=seed), work, say)
+        print(plain(told(seen, whole)))
         return
     if out is None:
         raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     config = DiagnosisConfig(seed=seed) if max_windows is None else DiagnosisConfig(seed=seed, max_windows=max_windows)
-    session = open_session(model, dataset, config.thresholds.dataset, held_out)
-    result = diagnose(session, config, _teller())
+    stop = Stop() if minutes is None else Stop(minutes)
+    with Teller() as say:
+
+        def ask() -> bool:
+            stop.asked = True
+            if stop.searching:
+                say("ending the search; what was found by now is fitted and written (a second signal ends it all)")
+            return stop.searching
+
+        with first_signal(ask):
+            session = open_session(model, dataset, config.thresholds.dataset, held_out)
+            result = diagnose(session, config, say, stop)
     print(plain(summary(result.document, result.problem.thresholds.report)))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
     print(plain(plot(shown[0])) if shown else "", flush=True)
@@ -196,15 +216,6 @@ def compensate(
     print(table_of(compensation))
     write_compensation(out, compensation)
     print(f"written: {out}, sha256 {compensation.sha256[:12]}")
-
-
-def _teller() -> Callable[[str], None]:
-    began = time.monotonic()
-
-    def say(text: str) -> None:
-        print(plain(f"[{time.monotonic() - began:5.1f} s] {text}"), flush=True)
-
-    return say
 
 
 def run(arguments: list[str]) -> int:

@@ -197,7 +197,7 @@ def at_once(data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("TMPDIR", str(data / "elsewhere"))
     (data / "elsewhere").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", None)
-    monkeypatch.setattr(diagnose, "diagnose", lambda session, config, say: Done)
+    monkeypatch.setattr(diagnose, "diagnose", lambda *_: Done)
     monkeypatch.setattr(report, "summary", lambda *_: "found")
     monkeypatch.setattr(report, "examples", lambda *_, **__: [])
     monkeypatch.setattr(windows, "windows_inlay", lambda *_: "")
@@ -321,7 +321,7 @@ def test_a_name_taken_meanwhile_is_not_replaced_and_the_result_is_kept(
     """Somebody writes to the folder while the diagnosis runs."""
     from bumblebee.diagnosis import diagnose
 
-    def slow(session: object, config: object, say: object) -> type:
+    def slow(*_: object) -> type:
         (at_once / "found").mkdir()
         (at_once / "found" / "theirs").write_text("x")
         return Done

@@ -56,6 +56,7 @@ def diagnose(
     out: str | Path | None = None,
     seed: int = 0,
     max_windows: int = 120,
+    minutes: float = float("inf"),
     say: Callable[[str], None] = lambda text: None,
 ) -> "Diagnosis":
     """Find which effects the declared model lacks, and how large they are.
@@ -65,6 +66,7 @@ def diagnose(
         out: a new folder for diagnosis.json, model.xml, effects.yaml and report.html; None writes nothing.
         seed: seed of the perturbed starts.
         max_windows: windows of the fit.
+        minutes: time for all of it [min]; what was found by then is fitted and reported.
         say: called with a line for each step.
 
     Returns:
@@ -77,13 +79,14 @@ def diagnose(
     from bumblebee.diagnosis.diagnose import diagnose as find
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder
+    from bumblebee.diagnosis.simulation import Stop
     from bumblebee.report.windows import windows_inlay
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     if out is not None:
         claim_folder(Path(out), DIAGNOSIS, False, [])
-    found = find(_session(session), DiagnosisConfig(seed=seed, max_windows=max_windows), say)
+    found = find(_session(session), DiagnosisConfig(seed=seed, max_windows=max_windows), say, Stop(minutes))
     if out is not None:
         write_diagnosis(found, Path(out), False, windows_inlay(found.session, found.effects))
     return found

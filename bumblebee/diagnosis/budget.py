@@ -19,6 +19,8 @@ class Budget:
     setting: str = "beyond_seconds"
     """Where the seconds are set."""
     clock: Callable[[], float] = time.process_time
+    over: Callable[[], bool] = lambda: False
+    """Whether even running steps must end."""
     left_out: list[str] = field(default_factory=list)
     """Work that was not begun, in words, each once."""
     began: float = field(init=False)
@@ -28,7 +30,7 @@ class Budget:
 
     def has_time_for(self, what: str) -> bool:
         """Whether `what` may begin; else it is written down."""
-        if self.clock() - self.began <= self.seconds:
+        if self.clock() - self.began <= self.seconds and not self.over():
             return True
         if what not in self.left_out:
             self.left_out.append(what)
@@ -38,5 +40,6 @@ class Budget:
         """A line on what was left out; none where nothing was."""
         if not self.left_out:
             return []
-        ended = f"the search {self.search} ended at its limit of {self.seconds:.0f} s of processor time"
-        return [f"{ended} (`{self.setting}`); not tried: " + "; ".join(self.left_out)]
+        limit = f"at its limit of {self.seconds:.0f} s of processor time (`{self.setting}`)"
+        why = "early, by `--minutes` or a signal" if self.over() else limit
+        return [f"the search {self.search} ended {why}; not tried: " + "; ".join(self.left_out)]

@@ -44,6 +44,7 @@ from bumblebee.diagnosis.selection import (
     with_other_laws,
 )
 from bumblebee.diagnosis.selection import entries as rounding_entries
+from bumblebee.diagnosis.simulation import OutOfTime, Stop, ending
 from bumblebee.sim.effects import Effect
 
 
@@ -77,22 +78,27 @@ class _Found:
 
 
 def diagnose(
-    session: Session, config: DiagnosisConfig | None = None, say: Callable[[str], None] = lambda text: None
+    session: Session,
+    config: DiagnosisConfig | None = None,
+    say: Callable[[str], None] = lambda text: None,
+    stop: Stop | None = None,
 ) -> Diagnosis:
     """Find the effects that the declared model of `session` lacks.
+
+    Where `stop` ends the searches early, what they have found by then is fitted and reported.
 
     Linear algebra takes one thread meanwhile: its matrices have some hundred rows, and a Cholesky factor of 580 that
     took 1.3 ms on one thread took 54 ms on two of a busy machine.
     """
     with threadpool_limits(1, user_api="blas"):
-        return _diagnose(session, config or DiagnosisConfig(), say)
+        return _diagnose(session, config or DiagnosisConfig(), say, stop or Stop())
 
 
-def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], None]) -> Diagnosis:
+def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], None], stop: Stop) -> Diagnosis:
     """Diagnose on the threads that there are."""
     rng = np.random.default_rng(config.seed)
     material = gather(session, config, rng, say)
-    found = _found(material, config, rng, say)
+    found = _found(material, config, rng, say, stop)
     say(f"prediction error before and after {len(found.last.fit.chosen)} effects")
     shares = partial(shares_left_out, material.session, config.report_windows)
     entries = effect_entries(found.search, found.last, found.holdout, found.beyond, shares)
@@ -122,10 +128,14 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)
 
 
-def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None]) -> _Found:
+def _found(
+    material: Material, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None], stop: Stop
+) -> _Found:
     """The effects of the catalogue, then what lies beyond it."""
     larger = max(1.0, material.session.plant.model.nv / max(1, material.session.thresholds.time_steps.small_model))
-    time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds")
+    stop.searching = True
+    over = partial(stop.over, stop.search)
+    time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds", over=over)
     found = search(material.problem, material.holdout, material.remade, config.search, say, time)
     say(f"final fit of {len(found.fit.chosen)} effects")
     holdout = material.holdout.finely()
@@ -133,33 +143,40 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
-        return _Found(found, _finished(last, holdout, found), holdout, None, (time,))
+        return _Found(found, _finished(last, holdout, found, stop), holdout, None, (time,))
     say("testing the residual")
-    offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
+    budget = Budget(larger * config.beyond_seconds, over=partial(stop.over, stop.beyond))
+    offers = offers_of(found, material.candidates)
     activity = JointActivity(material.typical, material.still)
 
     def tested() -> Discovery:
         left = lack_of_fit(last.problem, holdout.problem, last.fit, activity)
         return Discovery(last.problem, holdout, last.fit, left, {}, {}, [])
 
-    beyond = material.session.plant.failures.attempt(
-        "model discrepancy",
-        lambda: discover(last.problem, holdout, last.fit, activity, say, offers, budget),
-        tested,
-    )
-    last = _finished(_with(beyond, last), beyond.holdout, found)
+    look = partial(discover, last.problem, holdout, last.fit, activity, say, offers, budget)
+    try:
+        with ending(budget.over):
+            beyond = material.session.plant.failures.attempt("model discrepancy", look, tested)
+    except OutOfTime:
+        budget.has_time_for("discrepancy models")
+        beyond = tested()
+    last = _finished(_with(beyond, last), beyond.holdout, found, stop)
     return _Found(with_catalogue_effects(found, last.fit), last, beyond.holdout, beyond, (time, budget))
 
 
-def _finished(last: Refined, holdout: Holdout, found: Search) -> Refined:
+def _finished(last: Refined, holdout: Holdout, found: Search, stop: Stop) -> Refined:
     """The last fit at the values of least simulation error, with other laws that fit as well.
 
-    What cannot be computed is left out.
+    What cannot be computed, or has no time left, is left out.
     """
-    attempt = last.problem.plant.failures.attempt
-    moved = attempt("least simulation error", lambda: least_simulation_error(last, holdout), lambda: last)
+    attempt, moved = last.problem.plant.failures.attempt, last
     every = found.columns.candidates
-    return attempt("laws of hysteresis", lambda: with_other_laws(moved, holdout, every), lambda: moved)
+    try:
+        with ending(partial(stop.over, stop.finish)):
+            moved = attempt("least simulation error", lambda: least_simulation_error(last, holdout), lambda: last)
+            return attempt("laws of hysteresis", lambda: with_other_laws(moved, holdout, every), lambda: moved)
+    except OutOfTime:
+        return moved
 
 
 def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, Any]], list[Effect]]:

@@ -34,6 +34,7 @@ from bumblebee.diagnosis.selection.state import Loss, SearchState
 from bumblebee.diagnosis.selection.swap import swap, swap_limits
 from bumblebee.diagnosis.selection.trial import Trial, simplest
 from bumblebee.diagnosis.sensitivities import Columns
+from bumblebee.diagnosis.simulation import OutOfTime, ending
 from bumblebee.sim.effects import Effect
 
 _ALL_JOINTS = "the usual effects of all joints"
@@ -76,20 +77,13 @@ def search(
     `remake` gives the candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m].
     """
     run, budget = begin(problem, holdout, remake, config, say), budget or Budget()
-    attempt = problem.plant.failures.attempt
-    _select(run, config, budget)
-    if attempt("lost commands", partial(find_packet_loss, run), _no):
-        _select(run, config, budget)
-    for _ in range(problem.thresholds.selection.forward.swaps):
-        if not budget.has_time_for("swap steps"):
-            break
-        say("comparing each effect with its rivals")
-        better = partial(_any_of, run, (swap, add_stribeck_friction, complete_frictions))
-        if not attempt("swap steps", better, _no):
-            break
-        _select(run, config, budget)
-    for last in (SearchState.prune, keep_declared_scale, merge_gain_parameters, add_dry_friction):
-        attempt(last.__name__.replace("_", " "), partial(last, run), _no)
+    run.keep_whole()
+    try:
+        with ending(budget.over):
+            _steps(run, config, budget)
+    except OutOfTime:
+        run.go_back()
+        budget.has_time_for("the step that was going on")
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
     return Search(
         run.fit,
@@ -104,6 +98,26 @@ def search(
         run.rejected,
         run.loss,
     )
+
+
+def _steps(run: SearchState, config: SearchConfig, budget: Budget) -> None:
+    """All steps of a search that has begun."""
+    attempt = run.problem.plant.failures.attempt
+    _select(run, config, budget)
+    if attempt("lost commands", partial(find_packet_loss, run), _no):
+        _select(run, config, budget)
+    for _ in range(run.rule.swaps):
+        run.keep_whole()
+        if not budget.has_time_for("swap steps"):
+            break
+        run.say("comparing each effect with its rivals")
+        better = partial(_any_of, run, (swap, add_stribeck_friction, complete_frictions))
+        if not attempt("swap steps", better, _no):
+            break
+        _select(run, config, budget)
+    for last in (SearchState.prune, keep_declared_scale, merge_gain_parameters, add_dry_friction):
+        run.keep_whole()
+        attempt(last.__name__.replace("_", " "), partial(last, run), _no)
 
 
 def begin(
@@ -136,6 +150,7 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
     vain, judged, touching, attempt = 0, None, _Touching(run), run.problem.plant.failures.attempt
     limits: list[Trial] = []
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
+        run.keep_whole()
         if not budget.has_time_for("more effects"):
             break
         tried, looked, anew = look_around(run)

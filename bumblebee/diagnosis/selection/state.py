@@ -1,7 +1,9 @@
 """The state of one search: what is chosen, what is left to try, and the moves from one state to the next."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -53,9 +55,19 @@ class SearchState:
         self.rejected: list[str] = []
         self.loss: Loss | None = None
         self.given = 0
+        self._whole: dict[str, Any] = {}
         self.tried_many, self.asked_far, self.patience = False, False, config.patience
         self.fall, self.whitened_at = 1.0, self.power()
         self.candidates, _ = remake([])
+
+    def keep_whole(self) -> None:
+        """Remember this state as one that the search can be left in."""
+        kept = {name: value for name, value in vars(self).items() if name != "_whole"}
+        self._whole = {n: copy(value) if isinstance(value, (set, list)) else value for n, value in kept.items()}
+
+    def go_back(self) -> None:
+        """The state that was remembered last."""
+        vars(self).update(self._whole)
 
     def open(self) -> None:
         """Screen all candidates for the first time, and set the z that each must reach."""

@@ -38,6 +38,7 @@ from bumblebee.diagnosis.simulation.simulate import (
     residuals,
     with_step,
 )
+from bumblebee.diagnosis.simulation.stop import OutOfTime, Stop, ending
 from bumblebee.diagnosis.simulation.units import (
     KINDS,
     joint_units,
@@ -62,9 +63,11 @@ __all__ = [
     "Changes",
     "Condition",
     "Layout",
+    "OutOfTime",
     "Plant",
     "Recall",
     "Starts",
+    "Stop",
     "Variation",
     "Windows",
     "activations",
@@ -79,6 +82,7 @@ __all__ = [
     "declared_values",
     "difference",
     "effects_in_words",
+    "ending",
     "in_words",
     "inputs_of",
     "joint_path",

@@ -18,6 +18,7 @@ from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restruc
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
 from bumblebee.diagnosis.simulation.setpoints import follow
+from bumblebee.diagnosis.simulation.stop import check
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
 from bumblebee.errors import BadInput
@@ -73,6 +74,7 @@ def residuals(
     far = out_of_reach(plant, windows)
     first = 0
     while first < copies:
+        check()
         part = _together(variations, first, chunk) if starts is None else range(first, min(first + chunk, copies))
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
         own = None if starts is None else starts.part(part)
