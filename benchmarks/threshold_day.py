@@ -2,13 +2,15 @@
 
     python -m benchmarks.threshold_day OUT --policy FOLDER [--workers N] [--dataset FOLDER ...]
     python -m benchmarks.threshold_day --table OUT [OUT ...] [--csv FILE]
+    python -m benchmarks.threshold_day OUT --times 0.5 --of FILE    all at once that `moves nothing` in the table FILE
 
 One run for all of them: while a document is made, every number that is read from `diagnosis.thresholds` carries its
 half and its double along, through the arithmetic of scalars to the comparison that it decides. A number that is read
 for comparisons alone, of which none comes out otherwise, moves nothing: the document would be the same to the byte. A
 number that goes into an array or into a function in C is said to `enter`; what its half would do only a run with that
 half tells. The documents themselves must come out as `same_documents` makes them: its `--compare` holds both folders
-against each other.
+against each other. What cannot be seen (a number that goes into a text or a list) is found by the third command: it
+makes the documents with all numbers halved or doubled that are said to move nothing, which must not change a byte.
 """
 
 import argparse
@@ -178,6 +180,22 @@ def observe() -> None:
         kind.__getattribute__ = read  # type: ignore[method-assign]
 
 
+def multiply(names: set[str], times: float) -> None:
+    """From here on some numbers of the diagnosis are read as so many times what they are."""
+    for owner, kind in rules().items():
+
+        def read(self: Any, name: str, owner: str = owner) -> Any:
+            value = object.__getattribute__(self, name)
+            return type(value)(times * value) if f"{owner}.{name}" in names else value
+
+        kind.__getattribute__ = read  # type: ignore[method-assign]
+
+
+def _multiplied(job: Any, policy: Path | None, out: Path, names: set[str], times: float) -> str:
+    multiply(names, times)
+    return same_documents.write(job, policy, out)
+
+
 def _observed(job: Any, policy: Path | None, out: Path) -> str:
     observe()
     counts.clear()
@@ -191,8 +209,12 @@ def run(options: argparse.Namespace) -> None:
     """Every document that is not there yet."""
     same_documents.single_threads()
     options.out.mkdir(parents=True, exist_ok=True)
+    work, more = _observed, tuple[Any, ...]()
+    if options.times is not None:
+        told = pd.read_csv(options.of)
+        work, more = _multiplied, (set(told["number"][told["says"] == "moves nothing"]), options.times)
     with ProcessPoolExecutor(options.workers, max_tasks_per_child=1) as pool:
-        done = [pool.submit(_observed, job, options.policy, options.out) for job in same_documents.left(options)]
+        done = [pool.submit(work, job, options.policy, options.out, *more) for job in same_documents.left(options)]
         for future in as_completed(done):
             print(future.result(), flush=True)
 
@@ -227,6 +249,8 @@ def main(argv: list[str] | None = None) -> int:
     same_documents.add_options(parser)
     parser.add_argument("--table", type=Path, nargs="+", metavar="OUT", help="folders of finished runs")
     parser.add_argument("--csv", type=Path, help="file for the whole table")
+    parser.add_argument("--times", type=float, help="factor on all numbers of --of that move nothing")
+    parser.add_argument("--of", type=Path, metavar="FILE", help="table of --csv")
     options = parser.parse_args(argv)
     if not options.table:
         run(options)
