@@ -31,7 +31,7 @@ import pandas as pd
 from benchmarks import same_documents
 
 COUNTS = ("read", "seen", "compared", "half", "double", "array")
-"""Columns: carriers made; of these whose use was seen; comparisons, those that half and double turn; uses in arrays."""
+"""Columns: carriers made; of these whose use was seen; comparisons, those that half and double turn; other uses."""
 _COMPARE = {np.less: operator.lt, np.less_equal: operator.le, np.greater: operator.gt, np.greater_equal: operator.ge,
             np.equal: operator.eq, np.not_equal: operator.ne}  # fmt: skip
 _CHOOSE = (np.minimum, np.maximum, np.fmin, np.fmax)
@@ -100,7 +100,11 @@ def _tried(work: Callable[..., Any], operands: list[Any]) -> Any:
 
 
 def _ufunc(self: Any, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-    if method == "__call__" and not options and (ufunc in _COMPARE or all(np.ndim(value) == 0 for value in inputs)):
+    if (
+        method == "__call__"
+        and not options
+        and (ufunc in _COMPARE or all(np.ndim(plain(value)) == 0 for value in inputs))
+    ):
         return worked(ufunc, *inputs)
     bare = getattr(ufunc, method)(*map(plain, inputs), **options)
     for value in inputs:
@@ -120,7 +124,7 @@ def _ufunc(self: Any, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any
 def _kind(base: type) -> type:
     """A number type whose instances carry."""
     body: dict[str, Any] = {"alternatives": {}, "used": False, "__array_ufunc__": _ufunc, "__hash__": base.__hash__}
-    body["bare"] = lambda self: base(base.__pos__(self)) if base is not int else int.__int__(self)
+    body["bare"] = lambda self: int.__int__(self) if base is int else base(float.__pos__(self))
     body["__reduce__"] = body["__reduce_ex__"] = lambda self, *_: (base, (self.bare(),))
     body["__deepcopy__"] = body["__copy__"] = lambda self, *_: self.bare()
     for name in ("lt", "le", "gt", "ge", "eq", "ne"):
@@ -130,9 +134,17 @@ def _kind(base: type) -> type:
         work = getattr(operator, name)
         body[f"__{name}__"] = lambda self, other, work=work: _two(work, self, other)
         body[f"__r{name}__"] = lambda self, other, work=work: _two(work, other, self)
+    for name, made in (("float", float), ("int", int), ("index", int), ("format", format), ("str", str)):
+        body[f"__{name}__"] = lambda self, *more, made=made: _left(made, self, *more)
     body["__neg__"] = lambda self: worked(operator.neg, self)
     body["__abs__"] = lambda self: worked(abs, self)
     return type(f"Carrying{base.__name__}", (base,), body)
+
+
+def _left(made: Callable[..., Any], value: Any, *more: Any) -> Any:
+    for name in value.alternatives:
+        counts[name, "array"] += 1
+    return made(value.bare(), *more)
 
 
 def _two(work: Callable[..., Any], left: Any, right: Any) -> Any:

@@ -53,6 +53,9 @@ def test_arrays_are_compared_element_by_element_and_what_enters_them_is_said():
     assert (told("y")["compared"], told("y")["half"], told("y")["double"], told("y")["array"]) == (1, 0, 0, 0)
     made = values * number(2.0, "z")
     assert type(made) is np.ndarray and made.tolist() == [0.2, 0.6] and told("z")["array"] == 1
+    for use in (float, int, "{:.1f}".format):
+        before = told("z")["array"]
+        assert use(number(2.0, "z")) == use(2.0) and told("z")["array"] == before + 1
 
 
 def test_a_use_that_cannot_be_seen_leaves_the_number_among_those_that_enter(tmp_path):
