@@ -11,7 +11,7 @@ VERBOSE ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.bumblebee-installed
 # File by file in three processes: on two cores one computes while another waits for a program or a server.
-TESTS = $(BIN)/python -m pytest -q -n 3 --dist loadfile --no-loadscope-reorder
+TESTS = $(BIN)/python -m pytest -q -n 3 --dist loadfile --no-loadscope-reorder --durations 20
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1

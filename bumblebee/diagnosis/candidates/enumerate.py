@@ -14,6 +14,9 @@ from bumblebee.diagnosis.thresholds.candidates import BodySteps, CandidateThresh
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import NO_SPEED_LIMIT
 
+_FADE_SECONDS = 1.0
+"""Shortest time over which a drive that fades is taken to fade [s]."""
+
 _AXES = (0.0, 0.0)
 
 
@@ -158,7 +161,7 @@ class _OnJoint:
         yield self._make("torque_lag", rule.time)
         yield self._make("encoder_delay", rule.time)
         for kind in ("strength_drift", "thermal_fade"):
-            yield self._make(kind, rule.fade / max(self.scales.duration, rule.fade_seconds))
+            yield self._make(kind, rule.fade / max(self.scales.duration, _FADE_SECONDS))
 
     def _saturations(self) -> Iterator[Candidate]:
         s, j, rule = self.scales, self.j, self.rules.drive

@@ -21,6 +21,9 @@ from bumblebee.diagnosis.simulation import Layout
 from bumblebee.diagnosis.thresholds.dataset import Smoothing
 from bumblebee.measured.rollout import Rollout
 
+_NEIGHBOURS = 2
+"""Neighbours on either side from which on there is something to gain."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Smoothed:
@@ -42,7 +45,7 @@ def smooth_rollouts(
     parts = layout.slices["joint_pos"], layout.slices["joint_vel"]
     for rollout in rollouts:
         near = round(rule.half_span / float(np.median(np.diff(rollout.time))))
-        if near < rule.neighbours or rollout.frames < rule.spans * near:
+        if near < _NEIGHBOURS or rollout.frames < rule.spans * near:
             out.append(rollout)
             left.append(sigma**2)
             continue

@@ -10,6 +10,9 @@ import numpy as np
 from bumblebee.diagnosis.thresholds.dataset import Split
 from bumblebee.measured.rollout import Rollout
 
+_COMMANDED = 1e-9
+"""Mean size of the commands [their unit] above which something is commanded at all."""
+
 
 def motion_names(rollouts: Sequence[Rollout], rule: Split) -> list[str]:
     """A name for each rollout's motion: its own, or that of an earlier rollout with the same commands."""
@@ -31,7 +34,7 @@ def _path(rollout: Rollout, rule: Split) -> np.ndarray | None:
     at = np.linspace(rollout.time[0], rollout.time[-1], rule.samples)
     path = np.stack([np.interp(at, rollout.time, column) for column in command.T])
     path -= path.mean(axis=1, keepdims=True)
-    return path if np.abs(path).mean() > rule.commanded else None
+    return path if np.abs(path).mean() > _COMMANDED else None
 
 
 def _same(a: Rollout, b: Rollout, mine: np.ndarray, other: np.ndarray | None, rule: Split) -> bool:

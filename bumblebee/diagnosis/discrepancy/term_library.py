@@ -16,6 +16,15 @@ from bumblebee.diagnosis.discrepancy.regressors import Quantities
 from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
 from bumblebee.sim.effects import Term, read_term
 
+_MOST_TARGET_STEPS = 250.0
+"""Steps over its range at most of a target that arrives in steps."""
+_FASTEST_STRENGTH_BEAT = 3.0
+"""Fastest beat of the drive's strength [Hz]."""
+_FASTEST_FRICTION_BEAT = 1.0
+"""Fastest beat of dry friction [Hz]."""
+_FEWEST_KNOTS = 3
+"""Different knots that a table needs; with less it gets the smallest, the mean and the largest value."""
+
 _POSITION, _VELOCITY, _TARGET, _TORQUE, _TIME, _HISTORY = ((name,) for name in QUANTITIES)
 
 
@@ -144,7 +153,7 @@ def _target(data: Quantities, j: int) -> Iterator[BasisFunction]:
         make = _slewed(data.tick)
         yield BasisFunction(make(rate), (*_TARGET, *_HISTORY), 2, "", float(rate), make, rule.slew_reach * float(rate))
     span = float(np.ptp(u))
-    for steps in np.arange(rule.least_target_steps, rule.most_target_steps, rule.target_steps_apart):
+    for steps in np.arange(rule.least_target_steps, _MOST_TARGET_STEPS, rule.target_steps_apart):
         size = span / steps
         if size > rule.least_target_step:
             yield BasisFunction(_stair(size), _TARGET, 3, "", size, _stair, rule.target_steps_apart * size / steps)
@@ -164,8 +173,8 @@ def _time(data: Quantities, j: int) -> Iterator[BasisFunction]:
     yield BasisFunction(("t", "1"), _TIME, 2)
     beats = (
         ("{}", rule.fastest_beat),
-        ("tau*{}", rule.fastest_strength_beat),
-        ("friction({})", rule.fastest_friction_beat),
+        ("tau*{}", _FASTEST_STRENGTH_BEAT),
+        ("friction({})", _FASTEST_FRICTION_BEAT),
     )
     for kind, fastest in beats:
         if "tau" in kind and np.ptp(data.tau[..., j]) == 0:
@@ -222,7 +231,7 @@ def _table(
     """None where the quantity stands still, to the digits that a term is written with."""
     rule, x = data.thresholds.term_library, read_term(name)(data.values(j))
     knots = _written(np.quantile(x, np.linspace(*rule.table_quantiles, count)))
-    if len(knots) < rule.fewest_knots:
+    if len(knots) < _FEWEST_KNOTS:
         knots = _written(np.array([x.min(), x.mean(), x.max()]))
     if len(knots) < 2:
         return None

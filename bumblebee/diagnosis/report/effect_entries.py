@@ -17,6 +17,10 @@ from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
 from bumblebee.diagnosis.thresholds.report import Effects
 from bumblebee.sim.effects import CATALOGUE, Effect, is_native
 
+_COMPARABLE = 0.25
+"""Share of the change of dry friction from which on friction that changes with direction or speed is one entry with
+it: a smaller one is an effect beside it, not its shape."""
+
 SURFACE = "surface_contact"
 
 
@@ -96,7 +100,7 @@ def _levels(fit: Fit, rule: Effects) -> dict[Candidate, Candidate]:
     return {
         c: dry[where]
         for where, c in largest.items()
-        if abs(fit.of(c)[0]) > rule.comparable * abs(fit.of(dry[where])[0] - dry[where].nominal[0])
+        if abs(fit.of(c)[0]) > _COMPARABLE * abs(fit.of(dry[where])[0] - dry[where].nominal[0])
     }
 
 

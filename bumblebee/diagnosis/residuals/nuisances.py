@@ -22,6 +22,9 @@ import numpy as np
 from bumblebee.diagnosis.simulation import Layout, Plant, Starts, Variation, Windows, residuals
 from bumblebee.diagnosis.thresholds.residuals import Nuisances
 
+_LEAST_ARMATURE = 0.1
+"""Share of a joint's armature that a late velocity loop leaves at least: of a small one it would take all."""
+
 NAMES = ("integrator", "position_loop", "velocity_loop", "velocity_clock", "height")
 
 
@@ -78,7 +81,7 @@ def _late_model(declared: mujoco.MjModel, own: Plant, part: str, rule: Nuisances
                 model.actuator_biasprm[a, 2] += kp * rule.unit
             else:
                 lighter = model.dof_armature[dof] - kd * gear**2 * rule.unit
-                model.dof_armature[dof] = max(rule.least_armature * model.dof_armature[dof], lighter)
+                model.dof_armature[dof] = max(_LEAST_ARMATURE * model.dof_armature[dof], lighter)
     return model
 
 

@@ -94,16 +94,15 @@ def restless(problem: Problem, answers: np.ndarray, residual: np.ndarray, count:
     return [problem.plant.joints[j] for j in np.argsort(-power)[:count] if power[j] > rule.restless]
 
 
-def is_promising(c: Candidate, tests: Scores, k: int, bound: float, share: float, fit: Fit, rule: Screening) -> bool:
+def is_promising(c: Candidate, tests: Scores, k: int, bound: float, fit: Fit, rule: Screening) -> bool:
     """Whether a candidate, number `k` of `tests`, is significant and can move the way it wants to.
 
-    One that promises much of the whole cost is tried, too: where a few windows are very far off they decide its
-    variance, and only the fit with it, in which they are not, can say how sure it is. So is one that gains much more
-    than noise of the residual's power would give it, for the same reason. `bound` is the z to reach, `share` that of
-    the windows the tests were made on; `fit` is that of all windows.
+    One that gains much more than noise of the residual's power would give it is tried, too: where a few windows are
+    very far off they decide its variance, and only the fit with it, in which they are not, can say how sure it is.
+    `bound` is the z to reach; `fit` is that of all windows.
     """
     power = fit.cost / fit.residual.size
-    much = tests.gain[k] > min(rule.much * share * fit.cost, rule.plain * max(power, 1.0) * bound**2)
+    much = tests.gain[k] > rule.plain * max(power, 1.0) * bound**2
     return bool(tests.z[k] >= bound or much) and any(_can_move(c, tests.steps[k], rule.free))
 
 

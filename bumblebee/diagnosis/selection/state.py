@@ -109,7 +109,7 @@ class SearchState:
             c = self.columns.candidates[k]
             if len(found) >= self.config.simulated or tests.gain[k] <= least:
                 break
-            if self.is_open(c, tests, k, bound * share * self.bound, share**2) and not is_like(c, found):
+            if self.is_open(c, tests, k, bound * share * self.bound) and not is_like(c, found):
                 found.append(c)
                 if tests.gain[k] > sure and tests.z[k] > self.bound:
                     least = max(least, rule.faint * tests.gain[k])
@@ -118,23 +118,23 @@ class SearchState:
         joints = len(self.problem.plant.joints)
         listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
         listed = [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
-        return found + self.seen(listed, bound * share * self.bound, share**2)
+        return found + self.seen(listed, bound * share * self.bound)
 
-    def seen(self, listed: Sequence[Candidate], bound: float, share: float) -> list[Candidate]:
+    def seen(self, listed: Sequence[Candidate], bound: float) -> list[Candidate]:
         """Those of some candidates without screening columns that the screening windows, too, make worth a trial."""
         if not listed:
             return []
         columns = Columns(listed, self.small.sensitivities(listed, self.fit.effects))
         tests = score_tests(self.small, columns, self.small_fit(), self.weights[self.keep])
-        return [c for k, c in enumerate(listed) if self.is_open(c, tests, k, bound, share)]
+        return [c for k, c in enumerate(listed) if self.is_open(c, tests, k, bound)]
 
-    def is_open(self, c: Candidate, tests: Scores, k: int, bound: float, share: float) -> bool:
+    def is_open(self, c: Candidate, tests: Scores, k: int, bound: float) -> bool:
         """Whether a candidate, number `k` of `tests`, is worth a trial and was not chosen or tried in vain."""
         if c in self.closed or is_chosen(c, self.fit.chosen):
             return False
         if c.effect in SATURATIONS and tests.z[k] < bound:  # those that few windows feel have trials of their own
             return False
-        return is_promising(c, tests, k, bound, share, self.fit, self.problem.thresholds.selection.screening)
+        return is_promising(c, tests, k, bound, self.fit, self.problem.thresholds.selection.screening)
 
     def trials(self) -> tuple[list[Trial], list[Candidate]]:
         """Candidates tried in the simulator with their costs; and those that were looked at."""
@@ -146,7 +146,7 @@ class SearchState:
         if not left:
             return [], looked
         tests = score_tests(self.problem, self.sensitivities(left), self.fit, self.weights)
-        order = [k for k in np.argsort(-tests.gain) if self.is_open(left[k], tests, k, self.bound, 1.0)]
+        order = [k for k in np.argsort(-tests.gain) if self.is_open(left[k], tests, k, self.bound)]
         joints, best = len(self.problem.plant.joints), max((tests.gain[k] for k in order), default=0.0)
         faint = [k for k in order if tests.gain[k] < self.rule.faint * best and not shortlisted(left[k], joints)]
         wait, order = [left[k] for k in faint], [k for k in order if k not in faint][: self.config.trials]
@@ -158,9 +158,9 @@ class SearchState:
         """Those of some candidates that as many windows as were screened do not speak against."""
         self.stages = self.stages.on(self.problem, self.keep)
         known, tests = self.stages.tests(self.problem, self.columns, looked, self.fit, self.weights)
-        share = len(self.stages.both) / len(self.problem.windows)
-        least = self.rule.bound_share * np.sqrt(share) * self.bound
-        gone = [c for k, c in enumerate(known) if not self.is_open(c, tests, k, least, share)]
+        share = np.sqrt(len(self.stages.both) / len(self.problem.windows))
+        least = self.rule.bound_share * share * self.bound
+        gone = [c for k, c in enumerate(known) if not self.is_open(c, tests, k, least)]
         return [c for c in looked if c not in gone]
 
     def sensitivities(self, looked: Sequence[Candidate]) -> Columns:

@@ -13,6 +13,9 @@ import numpy as np
 from bumblebee.diagnosis.thresholds.simulation import DriveProbe
 from bumblebee.errors import BadInput
 
+_FEEDBACK = 1e-9
+"""Stiffness [N m/rad, N/m] above which an actuator feeds a position back, and takes a position target."""
+
 _AFFINE = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
 
 
@@ -51,7 +54,7 @@ def drive_law(model: mujoco.MjModel, where: object, rule: DriveProbe) -> DriveLa
             gear = model.actuator_gear[a, 0]
             stiffness[a] = -(_force(model, data, fed, np.zeros(count), reset=False)[a] - base[a]) / (rule.step * gear)
     simple = np.isin(model.actuator_gaintype, _AFFINE) & (model.actuator_gainprm[:, 1:3] == 0).all(axis=1)
-    return DriveLaw(gain, stiffness, simple, np.abs(stiffness) > rule.feedback)
+    return DriveLaw(gain, stiffness, simple, np.abs(stiffness) > _FEEDBACK)
 
 
 def _force(

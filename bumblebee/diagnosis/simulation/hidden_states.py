@@ -19,6 +19,9 @@ from bumblebee.diagnosis.thresholds.simulation import HiddenStates
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import SUFFIX
 
+_LEAD_ERROR = 0.1
+"""Share of the lead by which that of a window may differ; beyond it the log has a gap there."""
+
 Known = tuple[np.ndarray, np.ndarray, np.ndarray]
 """States (W, nq'), (W, nv') of a model with play or shafts, and for which windows (W,) they are to be believed."""
 
@@ -43,7 +46,7 @@ def earlier(plant: Plant, windows: Windows) -> tuple[Windows, float, np.ndarray]
     span = float(np.median(ahead))
     time = windows.command_time + ahead[:, None]
     early = replace(windows, start=first, qpos=qpos, qvel=qvel, command_time=time)
-    return early, span, np.abs(ahead - span) < plant.thresholds.hidden.lead_error * lead
+    return early, span, np.abs(ahead - span) < _LEAD_ERROR * lead
 
 
 def restructured(

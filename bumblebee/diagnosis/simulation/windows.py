@@ -14,6 +14,12 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.quaternions import rotate_by_cross
 
+_LEAD_SHARE = 0.25
+"""Share of a rollout that the lead may take at most."""
+_BRIEF = 0.004
+"""Longest gap between rows that is none [s]: of a fast log a row is lost now and then, and a command held for so much
+longer moves no joint by more than its neighbours' rows tell. Without it a log of 2 kHz that lost 1 % has no window."""
+
 
 @dataclass(frozen=True, eq=False)
 class Windows:
@@ -91,13 +97,13 @@ def _shares(lengths: Sequence[int], budget: int) -> list[int]:
 def _stretches(time: np.ndarray, horizon: float, rule: Windowing) -> list[tuple[int, int]]:
     """Consecutive stretches (first, last) of `horizon` s within the stamps `time` (T,)."""
     period = float(np.median(np.diff(time)))
-    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > max(rule.gap * period, rule.brief))))
+    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > max(rule.gap * period, _BRIEF))))
     last = np.searchsorted(time, time + horizon + 0.5 * period - 1e-9) - 1
     last = np.maximum(last, np.minimum(np.arange(len(time)) + 1, len(time) - 1))
     off = np.abs(time[last] - time - horizon)
     good = (off <= 0.51 * period + 1e-9) & (gaps[last] == gaps)
     found = []
-    k = int(np.searchsorted(time, time[0] + min(rule.lead, rule.lead_share * (time[-1] - time[0]))))
+    k = int(np.searchsorted(time, time[0] + min(rule.lead, _LEAD_SHARE * (time[-1] - time[0]))))
     while k < len(time) - 1:
         if good[k]:
             found.append((k, int(last[k])))
@@ -226,7 +232,7 @@ def _every_command(time: np.ndarray, command: np.ndarray, rule: Windowing) -> tu
     """
     apart = np.diff(time)
     period = float(np.median(apart))
-    brief = (apart > rule.gap * period) & (apart <= rule.brief)  # a window holds no longer ones
+    brief = (apart > rule.gap * period) & (apart <= _BRIEF)  # a window holds no longer ones
     lost = np.where(brief, np.round(apart / period) - 1, 0).astype(int)
     if not lost.any():
         return time, command

@@ -73,8 +73,6 @@ class DriveSteps:
     """Relative change of strength and gains."""
     fade: float = 0.1
     """Strength lost over the longest rollout."""
-    fade_seconds: float = 1.0
-    """Length of that at least [s]."""
     limit: tuple[float, ...] = (0.9, 0.6, 0.35)
     """Shares of the largest torque at which a limit is tried."""
     speed_limit: tuple[float, ...] = (0.6, 1.5, 4.0)

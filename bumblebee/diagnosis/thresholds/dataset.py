@@ -71,8 +71,6 @@ class Split:
     """Times at which commands are compared."""
     rows: int = 10
     """Rows from which on commands are compared."""
-    commanded: float = 1e-9
-    """Mean size of the commands [their unit] above which something is commanded at all."""
 
 
 @dataclass(frozen=True)
@@ -131,8 +129,6 @@ class Smoothing:
     """Time to either side that a fit is over [s]."""
     terms: int = 4
     """Terms of its polynomial: a cubic."""
-    neighbours: int = 2
-    """Neighbours on either side from which on there is something to gain."""
     spans: int = 4
     """Times the neighbours on one side that a rollout has rows at least."""
     beyond: float = 1.5

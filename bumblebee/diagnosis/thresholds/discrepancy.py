@@ -71,18 +71,12 @@ class TermLibrary:
     """Share of a rate by which it may move: the next of the grid is nearer beyond."""
     least_target_steps: float = 2.0
     """Steps over its range at least of a target that arrives in steps."""
-    most_target_steps: float = 250.0
-    """Steps over its range at most of a target that arrives in steps."""
     target_steps_apart: float = 0.4
     """Between the numbers of steps that are tried: a stair shifts by as much of a step at the end of the range."""
     least_target_step: float = 1e-3
     """[rad] Of the smallest step that is tried."""
     fastest_beat: float = 12.0
     """[Hz] The fastest beat of a torque by itself that is looked for."""
-    fastest_strength_beat: float = 3.0
-    """[Hz] The same of the drive's strength."""
-    fastest_friction_beat: float = 1.0
-    """[Hz] The same of dry friction."""
     beat_step: float = 0.5
     """Periods over a rollout between neighbouring frequencies: what it can tell apart."""
     table_quantiles: tuple[float, float] = (0.02, 0.98)
@@ -95,8 +89,6 @@ class TermLibrary:
     """Knots of the drive's strength over time."""
     coupling_knots: int = 6
     """Knots of a torque over another joint's position or velocity."""
-    fewest_knots: int = 3
-    """Different knots that a table needs; with less it gets the smallest, the mean and the largest value."""
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,6 @@ class MeasuredCurve:
 class Effects:
     """Settings of the list of effects."""
 
-    comparable: float = 0.25
-    """Share of the change of dry friction from which on friction that changes with direction or speed is one entry
-    with it: a smaller one is an effect beside it, not its shape."""
     experiments: int = 3
     """Experiments at most that are proposed to separate one effect from what cannot be told from it."""
 

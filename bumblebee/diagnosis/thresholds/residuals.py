@@ -38,8 +38,6 @@ class Nuisances:
     """Time that a coefficient of 1 stands for [s]."""
     height: float = 0.001
     """Height of the base that a coefficient of 1 stands for [m]."""
-    least_armature: float = 0.1
-    """Share of a joint's armature that a late velocity loop leaves at least: of a small one it would take all."""
     held_from: float = 2.0
     """Median chi-square by value of what is left, from which on their prior weighs more with it."""
 

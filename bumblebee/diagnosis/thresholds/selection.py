@@ -44,8 +44,6 @@ class Screening:
     """Times as many windows as are screened, from which on a second look is worth it."""
     restless: float = 1.5
     """Reduced chi-square of a joint's torques from which on it is listed for backlash and elasticity."""
-    much: float = 0.15
-    """Share of the cost that a candidate may promise, whatever its z."""
     plain: float = 2.0
     """Times the bound's chi-square that it may promise likewise."""
     free: float = 1e-3

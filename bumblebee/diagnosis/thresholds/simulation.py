@@ -9,15 +9,10 @@ class Windowing:
 
     lead: float = 0.1
     """A window starts this long after its rollout [s], so that a delayed command is known from the start."""
-    lead_share: float = 0.25
-    """Share of a rollout that the lead may take at most."""
     first_output: float = 0.02
     """Nothing is compared sooner after a start [s]: at 500 Hz the next reading says only that the start was read."""
     gap: float = 1.8
     """Periods between two rows from which on a tick is missing between them."""
-    brief: float = 0.004
-    """A gap of up to that [s] is none: of a fast log a row is lost now and then, and a command held for so much longer
-    moves no joint by more than its neighbours' rows tell. Without it a log of 2 kHz that lost 1 % has no window."""
     outputs: int = 6
     """Compared ticks of a window, the last among them."""
 
@@ -84,8 +79,6 @@ class HiddenStates:
     Behind a shaft the servo's own delay of half a step acts as stiffness, and the ends of a gap are met one and a half
     steps late, which is as if it were wider.
     """
-    lead_error: float = 0.1
-    """Share of the lead by which that of a window may differ; beyond it the log has a gap there."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +87,6 @@ class Solver:
 
     iterations: int = 30
     """Iterations at least, whatever a training model allows itself."""
-    line_search: int = 20
-    """Iterations of its line search at least."""
 
 
 @dataclass(frozen=True)
@@ -104,8 +95,6 @@ class DriveProbe:
 
     step: float = 1e-4
     """Change of input [its unit] and of position [rad, m]."""
-    feedback: float = 1e-9
-    """Stiffness [N m/rad, N/m] above which an actuator feeds a position back, and takes a position target."""
 
 
 @dataclass(frozen=True)

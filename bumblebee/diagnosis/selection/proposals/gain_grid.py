@@ -32,6 +32,9 @@ from bumblebee.diagnosis.thresholds.proposals import GainGrid
 from bumblebee.sim.effects import Effect, single
 from bumblebee.sim.servo import servos_of
 
+_LEAST_FACTOR = 0.001
+"""Smallest factor tried."""
+
 KINDS = ("kp", "kd", "coulomb_friction")
 Servo = tuple[float, float, float]
 """Factors on kp and kd, dry friction [N m]."""
@@ -62,7 +65,7 @@ class _Course:
         noise = p.sigma[part][self.columns]
         square = np.where(np.isfinite(error), error, rule.diverged) ** 2
         score = np.log(square.mean(axis=2) + (rule.noise_factor * noise) ** 2).mean(axis=1)
-        logs = np.log(np.maximum(np.array(several)[..., :2], rule.least_factor))
+        logs = np.log(np.maximum(np.array(several)[..., :2], _LEAST_FACTOR))
         return score + rule.unlike * ((logs - np.median(logs, axis=1, keepdims=True)) ** 2).sum(axis=2)
 
 
@@ -142,7 +145,7 @@ def _swept(course: _Course, servos: list[Servo], factors: Sequence[float]) -> li
 def _options(servo: Servo, factors: Sequence[float], limit: float, rule: GainGrid) -> list[Servo]:
     """The servo with other gains and dry friction; `limit` is its torque limit [N m]."""
     kp, kd, dry = servo
-    least, most = rule.least_factor, rule.most_dry * limit
+    least, most = _LEAST_FACTOR, rule.most_dry * limit
     rub = limit if np.isfinite(limit) else max(dry, 1.0)
     out = [(max(kp * f, least), kd, dry) for f in factors]
     out += [(kp, max(kd * f, least), dry) for f in factors]

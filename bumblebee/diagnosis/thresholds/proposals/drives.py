@@ -87,8 +87,6 @@ class GainGrid:
     """Score of a gain that is e times the others', which matters where a servo's own data say next to nothing."""
     least_fall: float = 0.1
     """Fall of the mean score from which on the servos are taken for far off."""
-    least_factor: float = 1e-3
-    """Smallest factor tried."""
     wrong_factor: float = 2.0
     """Factor by which a kp is wrong that counts as far off."""
     wrong_servos: float = 0.5
