@@ -54,7 +54,6 @@ NO_THRESHOLDS = {
     "selection/proposals/gain_grid.py": {"_LEAST_FACTOR"},
     "simulation/actuators.py": {"_FEEDBACK"},
     "simulation/hidden_states.py": {"_LEAD_ERROR"},
-    "simulation/plant.py": {"_LINE_SEARCH"},
     "simulation/windows.py": {"_LEAD_SHARE", "_BRIEF"},
     "selection/proposals/packet_loss.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile
 }

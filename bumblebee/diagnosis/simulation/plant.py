@@ -24,9 +24,6 @@ from bumblebee.robot.drives import ON_JOINT
 from bumblebee.sim.effects import is_hidden
 from bumblebee.sim.servo import actuator_of
 
-_LINE_SEARCH = 20
-"""Iterations of the solver's line search at least."""
-
 _FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 _PLACES = {
     int(mujoco.mjtTrn.mjTRN_TENDON): "a tendon",
@@ -135,7 +132,7 @@ def make_plant(
     refuse_unmade(model, condition.loads, where)
     set_supply(model, condition.supply)
     model.opt.iterations = max(rules.solver.iterations, model.opt.iterations)
-    model.opt.ls_iterations = max(_LINE_SEARCH, model.opt.ls_iterations)
+    model.opt.ls_iterations = max(rules.solver.line_search, model.opt.ls_iterations)
     free, joints = _match_joints(model, rollout, where)
     actuator = np.array([actuator_of(model, j) for j in joints], dtype=int)
     law = drive_law(model, where, rules.drive)

@@ -87,6 +87,8 @@ class Solver:
 
     iterations: int = 30
     """Iterations at least, whatever a training model allows itself."""
+    line_search: int = 20
+    """Iterations of its line search at least."""
 
 
 @dataclass(frozen=True)
