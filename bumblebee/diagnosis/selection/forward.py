@@ -76,7 +76,8 @@ def search(
 
     `remake` gives the candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m].
     """
-    run, budget = begin(problem, holdout, remake, config, say), budget or Budget()
+    budget = budget or Budget()
+    run = begin(problem, holdout, remake, config, say, budget)
     run.keep_whole()
     try:
         with ending(budget.over):
@@ -126,10 +127,17 @@ def begin(
     remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
     config: SearchConfig,
     say: Callable[[str], None],
+    budget: Budget,
 ) -> SearchState:
     """A search at its beginning: with servos far from the declared ones if need be, and all candidates screened."""
     run = SearchState(problem, holdout, remake, config, say)
-    problem.plant.failures.attempt("gains far from the declared ones", partial(start_with_gain_grid, run), _no)
+    run.keep_whole()
+    try:
+        with ending(budget.over):
+            problem.plant.failures.attempt("gains far from the declared ones", partial(start_with_gain_grid, run), _no)
+    except OutOfTime:
+        run.go_back()
+        budget.has_time_for("gains far from the declared ones")
     run.open()
     return run
 
