@@ -29,6 +29,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks import same_documents
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 
 COUNTS = ("read", "seen", "compared", "half", "double", "array")
 """Columns: carriers made; of these whose use was seen; comparisons, those that half and double turn; other uses."""
@@ -234,6 +235,8 @@ def run(options: argparse.Namespace) -> None:
 def table(folders: list[Path]) -> pd.DataFrame:
     """A row a number: its value, in how many documents it is read, its counts, and what they say."""
     parts = [pd.read_csv(path) for folder in folders for path in sorted(folder.glob("*.csv"))]
+    if not parts:
+        raise BadInput("--table", "folders of finished runs", "none with a CSV file")
     together = pd.concat(parts, ignore_index=True).groupby("number")
     every = pd.Series(numbers(), name="value").rename_axis("number").to_frame()
     every["documents"] = together.size().reindex(every.index, fill_value=0)
@@ -264,10 +267,16 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--times", type=float, help="factor on all numbers of --of that move nothing")
     parser.add_argument("--of", type=Path, metavar="FILE", help="table of --csv")
     options = parser.parse_args(argv)
-    if not options.table:
-        run(options)
-        return 0
-    told = table(options.table)
+    try:
+        if not options.table:
+            if options.out is None or (options.times is None) != (options.of is None):
+                raise BadInput("options", "OUT, with both --times and --of or neither, or --table", "others")
+            run(options)
+            return 0
+        told = table(options.table)
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return EXIT_BAD_INPUT
     if options.csv:
         told.to_csv(options.csv)
     print(told["says"].value_counts().to_string())

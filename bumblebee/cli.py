@@ -59,7 +59,7 @@ def diagnose(
     ] = None,
     minutes: Annotated[
         float | None,
-        typer.Option("--minutes", min=0.1, max=10_000, help="Time for all of it [min]."),
+        typer.Option("--minutes", min=0.1, max=10_000, help="Time [min]; the search ends after half of it."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the perturbed starts.")] = 0,
 ) -> None:
@@ -72,7 +72,6 @@ def diagnose(
     from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
-    from bumblebee.diagnosis.quick import QuickConfig, first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
     from bumblebee.diagnosis.simulation import Stop
     from bumblebee.first_signal import first_signal
@@ -80,19 +79,14 @@ def diagnose(
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
-    held_out = read_held_out(held) if held else None
     if quick:
         if out is not None:
             raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
-        work = QuickConfig() if max_windows is None else QuickConfig(windows=max_windows)
-        session = open_session(model, dataset, None, held_out)
-        whole = shlex.join(["bumblebee", "diagnose", str(model), str(dataset), "--out", "found"])
-        with Teller() as say:
-            seen = first_look(session, DiagnosisConfig(seed=seed), work, say)
-        print(plain(told(seen, whole)))
+        _first_look(model, dataset, held, max_windows, seed)
         return
     if out is None:
         raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
+    held_out = read_held_out(held) if held else None
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     config = DiagnosisConfig(seed=seed) if max_windows is None else DiagnosisConfig(seed=seed, max_windows=max_windows)
     stop = Stop() if minutes is None else Stop(minutes)
@@ -112,6 +106,19 @@ def diagnose(
     print(plain(plot(shown[0])) if shown else "", flush=True)
     write_diagnosis(result, out, overwrite, windows_inlay(result.session, result.effects))
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
+
+
+def _first_look(model: Path, dataset: Path, held: str | None, max_windows: int | None, seed: int) -> None:
+    from bumblebee.diagnosis.config import DiagnosisConfig
+    from bumblebee.diagnosis.dataset import open_session, read_held_out
+    from bumblebee.diagnosis.quick import QuickConfig, first_look, told
+
+    work = QuickConfig() if max_windows is None else QuickConfig(windows=max_windows)
+    session = open_session(model, dataset, None, read_held_out(held) if held else None)
+    whole = shlex.join(["bumblebee", "diagnose", str(model), str(dataset), "--out", "found"])
+    with Teller() as say:
+        seen = first_look(session, DiagnosisConfig(seed=seed), work, say)
+    print(plain(told(seen, whole)))
 
 
 def replay(

@@ -23,6 +23,8 @@ class Budget:
     """Whether even running steps must end."""
     left_out: list[str] = field(default_factory=list)
     """Work that was not begun, in words, each once."""
+    early: bool = field(init=False, default=False)
+    """Whether `over` and not the seconds kept something from beginning."""
     began: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -30,8 +32,10 @@ class Budget:
 
     def has_time_for(self, what: str) -> bool:
         """Whether `what` may begin; else it is written down."""
-        if self.clock() - self.began <= self.seconds and not self.over():
+        early = self.over()
+        if self.clock() - self.began <= self.seconds and not early:
             return True
+        self.early = self.early or early
         if what not in self.left_out:
             self.left_out.append(what)
         return False
@@ -41,5 +45,5 @@ class Budget:
         if not self.left_out:
             return []
         limit = f"at its limit of {self.seconds:.0f} s of processor time (`{self.setting}`)"
-        why = "early, by `--minutes` or a signal" if self.over() else limit
+        why = "early, by `--minutes` or a signal" if self.early else limit
         return [f"the search {self.search} ended {why}; not tried: " + "; ".join(self.left_out)]

@@ -67,6 +67,13 @@ def test_a_use_that_cannot_be_seen_leaves_the_number_among_those_that_enter(tmp_
     assert (says["Validation.z"], says["Later.z"], says["Later.growth"]) == ("enters", "decides", "never read")
 
 
+@pytest.mark.parametrize("line", [[], ["out", "--times", "2"], ["out", "--of", "x.csv"], ["--table", "."]])
+def test_options_that_say_nothing_to_do_are_one_line(line, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert day.main(line) == 2
+    assert capsys.readouterr().err.count("\n") == 1 and list(tmp_path.iterdir()) == []
+
+
 def test_carriers_leave_a_process_and_a_copy_as_plain_numbers():
     for value in (number(0.5), number(7), day.carry(np.float64(0.5), {"x": (0.25, 1.0)})):
         for left in (pickle.loads(pickle.dumps(value)), deepcopy(value)):

@@ -31,6 +31,17 @@ def test_the_note_says_which_search_was_cut_and_by_what_setting() -> None:
     assert note == f"{ended} (`search_seconds`); not tried: more effects"
 
 
+def test_what_cut_a_search_is_said_though_the_other_limit_comes_later() -> None:
+    now, over = [0.0], [False]
+    budget = Budget(60.0, clock=lambda: now[0], over=lambda: over[0])
+    now[0] = 61.0
+    assert not budget.has_time_for("more effects")
+    over[0] = True
+    assert "60 s of processor time" in budget.notes()[0]
+    early = Budget(60.0, clock=lambda: 0.0, over=lambda: True)
+    assert not early.has_time_for("more effects") and "`--minutes` or a signal" in early.notes()[0]
+
+
 def test_time_in_which_others_work_does_not_count() -> None:
     assert Budget().clock is time.process_time
 

@@ -78,13 +78,7 @@ def search(
     """
     budget = budget or Budget()
     run = begin(problem, holdout, remake, config, say, budget)
-    run.keep_whole()
-    try:
-        with ending(budget.over):
-            _steps(run, config, budget)
-    except OutOfTime:
-        run.go_back()
-        budget.has_time_for("the step that was going on")
+    _in_time(run, budget, "the step that was going on", partial(_steps, run, config, budget))
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
     return Search(
         run.fit,
@@ -131,15 +125,21 @@ def begin(
 ) -> SearchState:
     """A search at its beginning: with servos far from the declared ones if need be, and all candidates screened."""
     run = SearchState(problem, holdout, remake, config, say)
+    name, far = "gains far from the declared ones", partial(start_with_gain_grid, run)
+    _in_time(run, budget, name, partial(problem.plant.failures.attempt, name, far, _no))
+    run.open()
+    return run
+
+
+def _in_time(run: SearchState, budget: Budget, what: str, take: Callable[[], object]) -> None:
+    """Call `take`; where its time ends, leave the search as it was last whole, and write down `what` was cut off."""
     run.keep_whole()
     try:
         with ending(budget.over):
-            problem.plant.failures.attempt("gains far from the declared ones", partial(start_with_gain_grid, run), _no)
+            take()
     except OutOfTime:
         run.go_back()
-        budget.has_time_for("gains far from the declared ones")
-    run.open()
-    return run
+        budget.has_time_for(what)
 
 
 def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
