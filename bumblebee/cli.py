@@ -25,6 +25,9 @@ _UNUSABLE: type[Exception] = typer.BadParameter.__bases__[0]  # the library's Us
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
 Data = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
+Minutes = Annotated[
+    float | None, typer.Option(min=0.1, max=10_000, help="Time [min]; the search ends after half of it.")
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result of this command.")]
 
 
@@ -57,10 +60,7 @@ def diagnose(
     max_windows: Annotated[
         int | None, typer.Option(min=8, help="Windows that take part in the fit; 120, and 40 with --quick.")
     ] = None,
-    minutes: Annotated[
-        float | None,
-        typer.Option("--minutes", min=0.1, max=10_000, help="Time [min]; the search ends after half of it."),
-    ] = None,
+    minutes: Minutes = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the perturbed starts.")] = 0,
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after.
