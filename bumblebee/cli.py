@@ -26,7 +26,7 @@ _UNUSABLE: type[Exception] = typer.BadParameter.__bases__[0]  # the library's Us
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
 Data = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
 Minutes = Annotated[
-    float | None, typer.Option(min=0.1, max=10_000, help="Time [min]; the search ends after half of it.")
+    float | None, typer.Option(min=0.1, max=10_000, help="Minutes; the search ends after half of them.")
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result of this command.")]
 
