@@ -119,7 +119,8 @@ NO_RESULT_OF = {
         )
     },
     "publish": {
-        f"bumblebee/{room}": _CONTRACT for room in ("motion/", "quaternions.py", "robot/", "sim/", "tracking/")
+        f"bumblebee/{room}": _CONTRACT
+        for room in ("effects/", "motion/", "quaternions.py", "robot/", "sim/", "tracking/")
     },
 }
 

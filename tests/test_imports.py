@@ -13,6 +13,7 @@ ORCHESTRATION = {"prefect", "dvc", "mlflow", "pydantic"}
 # What a room may import beside itself; a floor is a set of rooms that do not know each other.
 FLOORS = [
     {"robot"},
+    {"effects"},
     {"motion", "sim", "measured"},
     {"clustering", "tracking", "diagnosis"},
     {"learning", "evaluation"},
@@ -20,7 +21,7 @@ FLOORS = [
     {"report", "wire"},
     {"api", "view"},
 ]
-ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"sim", "measured"}}
+ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"effects", "sim", "measured"}}
 # Below the ground floor: known to everybody.
 FREE = {"errors", "files", "io", "last_line", "progress", "quaternions", "ranges", "__init__"}
 

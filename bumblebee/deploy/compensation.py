@@ -85,7 +85,7 @@ class Compensation:
     hysteresis: tuple[tuple[int, float, float, float], ...]
     """(joint, amplitude [N m], width [rad], 1 for Dahl's law, 0 for a spring that yields)."""
     terms: tuple[tuple[int, float, str], ...]
-    """(joint, coefficient, formula of `sim.effects.terms`)."""
+    """(joint, coefficient, formula of `effects.terms`)."""
     loads: tuple[Load, ...]
     """Whose gravity is carried."""
     limits: CompensationLimits

@@ -79,6 +79,18 @@ class Draft:
         own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("robot", "limits")}
         return Draft(self.robot, self.limits, **deepcopy(own))
 
+    def load(self, body: str) -> Load:
+        """What a body carries so far."""
+        model = self.robot.model
+        mass, com = float(model.body(body).mass[0]), tuple(map(float, model.body(body).ipos))
+        return self.loads.get(body, Load(body, (mass, mass), (com, com)))
+
+    def carry(self, body: str, mass: float | None = None, com: tuple[float, ...] | None = None) -> None:
+        """Note that a body's true mass [kg], or its centre of mass [m], is another."""
+        was = self.load(body)
+        masses = was.mass if mass is None else (was.mass[0], mass)
+        self.loads[body] = Load(body, masses, was.com if com is None else (was.com[0], com))
+
     @property
     def lead_time(self) -> np.ndarray:
         """(J,) [s] for targets: one that comes late is sent early, a drive that reads late is told where the joint was.

@@ -9,7 +9,7 @@ import mujoco
 from bumblebee.deploy.compensation import Compensation, PlannedEffect
 from bumblebee.deploy.compensation_draft import DeclaredRobot, Draft
 from bumblebee.deploy.compensation_limits import CompensationLimits
-from bumblebee.deploy.compensation_rules import CannotUndo, undo
+from bumblebee.effects.kind import CannotUndo
 from bumblebee.errors import BadInput
 from bumblebee.measured.model_file import load_model
 from bumblebee.robot.facts import g1_bodies, joint_names
@@ -48,7 +48,7 @@ def compensate(
         place = f"{where}: effects[{index}]: {effect.effect}"
         attempt = draft.copy()
         try:
-            done, size = undo(attempt, effect, _columns(place, effect))
+            done, size = CATALOGUE[effect.effect].undo(attempt, effect, _columns(place, effect))
             attempt.check(effect, place)
             draft = attempt
             plan.append(PlannedEffect(effect.effect, effect.where, done, size, ""))

@@ -21,23 +21,6 @@ from bumblebee.robot.model import build_spec
 
 SCHEMA = 2
 _AGAIN = "Run the stage seal again."
-UNITS = {
-    "coulomb_friction": "N m", "viscous_friction": "N m s/rad", "stribeck_friction": "N m, rad/s",
-    "asymmetric_friction": "N m", "armature": "kg m^2", "torque_limit": "N m", "torque_speed_limit": "rad/s",
-    "command_delay": "s", "torque_lag": "s", "encoder_delay": "s", "encoder_offset": "rad", "imu_offset": "rad",
-    "encoder_quantisation": "rad", "backlash": "rad", "series_elasticity": "N m/rad", "cogging": "N m",
-    "joint_spring": "N m/rad", "hysteresis": "N m, rad", "link_mass": "kg", "link_com": "m", "link_inertia": "kg m^2",
-    "ground_compliance": "s", "ground_slope": "rad", "thermal_fade": "1/s", "strength_drift": "1/s",
-    "external_wrench": "N, N m", "position_friction": "N m", "odd_cogging": "N m", "cross_coupling": "N m/rad",
-    "tendon": "N m/rad", "dwell_friction": "N m", "rate_limit": "rad/s", "quantised_command": "rad",
-    "drag": "N m s^2/rad^2", "dead_band": "rad", "ripple": "N m", "load_dependent_friction": "", "motor_strength": "",
-    "command_filter": "s", "command_rate_limit": "rad/s", "command_profile": "rad/s^2, rad/s",
-    "quadratic_friction": "N m s^2/rad^2",
-    "kp": "", "kd": "", "dropped_commands": "", "ground_friction": "", "gain_cycle": "", "loose_mount": "N m/rad",
-}  # fmt: skip
-"""Kind -> unit of its parameters; "" for a share or a factor."""
-if unlike := UNITS.keys() ^ KINDS.keys():
-    raise TypeError(f"bumblebee/deploy/stand_in_effects.py: UNITS needs a row for each kind, not so: {sorted(unlike)}")
 _DRAWN = {"sign": int, "axis": int, "number": int, "other": str}
 _PEAKS = ("peak_torque", "peak_speed", "peak_rate")
 
@@ -84,7 +67,7 @@ def entry(kind: Kind, place: Place, size: float) -> Json:
         "effect": kind.name,
         "where": [place.name] if place.name else [],
         "parameters": {name: float(parameters[name]) for name in changed},  # those that the size changes come first
-        "unit": UNITS[kind.name],
+        "unit": kind.unit,
         "size": float(size),
         "draw": {**place.draw, **{name: getattr(place, name) for name in _PEAKS}},
     }

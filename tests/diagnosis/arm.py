@@ -3,7 +3,7 @@
 And what every test of a room does first with rollouts, whatever robot made them: `session_of`, `problem_of`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import mujoco
@@ -63,10 +63,11 @@ def simulate(
     still: int | None = None,
     gains: tuple[float, float] | None = None,
     xml: str = XML,
+    passive: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> list[Rollout]:
     """Rollouts at 50 Hz of the arm with `effects` {(id, place): value}; joint `still` is neither moved nor free.
 
-    `xml` is the true arm where it is not the declared one.
+    `xml` is the true arm where it is not the declared one; `passive` a torque (3,) more, by q and v (3,).
     With `gains`, factors of kp and kd, the servos have these times their declared ones, and the metadata say so.
     """
     rng = np.random.default_rng(seed)
@@ -87,7 +88,7 @@ def simulate(
         else:
             table[kind][JOINTS.index(place)] = value
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    made = [_rollout(model, kp, kd, limit, table, seconds, rng, f"r{i:02d}", still) for i in range(count)]
+    made = [_rollout(model, kp, kd, limit, table, seconds, rng, f"r{i:02d}", still, passive) for i in range(count)]
     return made if gains is None else [replace(r, meta={"kp": kp.tolist(), "kd": kd.tolist()}) for r in made]
 
 
@@ -101,7 +102,7 @@ _NEUTRAL = {
 }
 
 
-def _rollout(model, kp, kd, limit, table, seconds, rng, name, still) -> Rollout:
+def _rollout(model, kp, kd, limit, table, seconds, rng, name, still, passive) -> Rollout:
     data, ticks = mujoco.MjData(model), round(seconds * 50)
     time = np.arange(ticks) / 50
     amp, freq, phase = rng.uniform(0.2, 0.6, (3, 3)), rng.uniform(0.2, 1.5, (3, 3)), rng.uniform(0, 6.28, (3, 3))
@@ -120,6 +121,8 @@ def _rollout(model, kp, kd, limit, table, seconds, rng, name, still) -> Rollout:
             torque = np.clip(table["motor_strength"] * (kp * error - kd * data.qvel), -limit, limit)
             torque -= table["viscous_friction"] * data.qvel + table["coulomb_friction"] * np.tanh(data.qvel / 0.002)
             data.qfrc_applied[:] = torque + table["spring"] * np.sin(8 * data.qpos)
+            if passive is not None:
+                data.qfrc_applied[:] += passive(data.qpos, data.qvel)
             if still is not None:
                 data.qvel[still] = data.qfrc_applied[still] = 0.0
                 data.qpos[still] = 0.0

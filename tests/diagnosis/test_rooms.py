@@ -40,7 +40,6 @@ NO_THRESHOLDS = {
     "plan/drawing.py": {"_PANELS"},  # what fits a page
     "residuals/problem.py": {"_GROUP"},  # memory
     # halved and doubled they move nothing on the fixed sample: docs/decisions/threshold-day.md
-    "candidates/enumerate.py": {"_AXES", "_FADE_SECONDS"},  # the first: indices
     "dataset/smoothing.py": {"_NEIGHBOURS"},
     "dataset/split.py": {"_COMMANDED"},
     "discrepancy/term_library.py": {

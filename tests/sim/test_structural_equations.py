@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from bumblebee.effects.native import NO_SURFACE, POINT_RADIUS
 from bumblebee.sim.effects import single
-from bumblebee.sim.effects.native import NO_SURFACE, POINT_RADIUS
 from tests.sim.hinge import ARM, FINE, INERTIA, MASS, TOTAL, both, check, model_with, path, reference, servo, swing
 
 

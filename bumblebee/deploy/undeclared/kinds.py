@@ -1,80 +1,20 @@
 """Every kind of effect in the lottery: how a size becomes a law, what the contract calls it, how far it may go.
 
-A size is a number >= 0 that grows with the effect; 0 is the declared robot. A draw fixes what a size leaves open
-(signs, axes, harmonics).
+A file of this folder with `KINDS`, a law beside its rows, is found by itself: that is how a new one comes in.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+import pkgutil
+from collections.abc import Callable, Iterator
+from importlib import import_module
 
 import numpy as np
 
 from bumblebee.deploy.undeclared import bodies, drives, friction, gears, outside, setpoints, signals
-from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.kind import Kind, Made, Place, fits, places
 from bumblebee.deploy.undeclared.law import Law
 from bumblebee.deploy.undeclared.ringing import softest
 
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Where one effect sits, and what its law needs to know of the declared robot there."""
-
-    robot: Declared
-    name: str
-    """Joint or body; "" for the whole robot."""
-    draw: dict[str, Any]
-    """sign (1 or -1), axis (0 to 2), number (harmonic), other (another joint)."""
-    peak_torque: float = 0.0
-    """Largest torque of this joint's drive in the declared robot's motion [N m]."""
-    peak_speed: float = 0.0
-    """Largest speed there [rad/s]."""
-    peak_rate: float = 0.0
-    """Largest change of its command, per second [rad/s]."""
-
-    @property
-    def j(self) -> int:
-        """Column of the joint."""
-        return self.robot.joints.index(self.name)
-
-    def of(self, table: np.ndarray) -> float:
-        """This joint's entry in (J,)."""
-        return float(table[self.j])
-
-
-Made = tuple[Law, dict[str, float]]
-"""A law, and its parameters by the contract's names (absolute values)."""
-
-
-@dataclass(frozen=True)
-class Kind:
-    """One kind of effect."""
-
-    name: str
-    on: str
-    """joint, body, base, hand, whole."""
-    make: Callable[[Place, float], Made]
-    first: Callable[[Place], float]
-    """A small size to begin the search for the detectable one with."""
-    most: Callable[[Place], float]
-    """The largest size that is still this robot."""
-    least: Callable[[Place], float] = lambda p: 0.0
-    """The smallest size that the true robots' simulation can hold."""
-    events: float = 0.0
-    """How often it must strike, on average, to strike at all four times in five; then its size is a share of ticks."""
-    robots: str = "both"
-    """both, arm or g1."""
-    group: str = "joint"
-    """joint, mass, contact, sensor: for the table."""
-    parts: tuple[str, ...] = field(default=())
-    """Other names of the catalogue under which a part of it is rightly found at the same place."""
-    depends: tuple[str, ...] = field(default=())
-    """Outside the catalogue: what it depends on, in the diagnosis's words; any of them is right."""
-
-    @property
-    def outside(self) -> bool:
-        """Whether the contract's catalogue has no name for it."""
-        return bool(self.depends)
+__all__ = ["CATALOGUE", "KINDS", "LATER", "OUTSIDE", "Kind", "Place", "fits", "places"]
 
 
 def _scaled(field_name: str, share: float) -> Callable[[Place], float]:
@@ -158,144 +98,189 @@ _L, _KP, _KD = (lambda x: _scaled("limit", x)), (lambda x: _scaled("kp", x)), (l
 CATALOGUE: tuple[Kind, ...] = (
     Kind("coulomb_friction", "joint",
          lambda p, s: (friction.Coulomb(p.name, p.of(p.robot.friction) + s),
-                       {"frictionloss": p.of(p.robot.friction) + s}), _L(0.01), _L(0.2)),
+                       {"frictionloss": p.of(p.robot.friction) + s}), _L(0.01), _L(0.2),
+         fault=_L(0.2), unit="N m"),  # a gear without grease: 28 N m at the knee, 5 at the elbow
     Kind("viscous_friction", "joint",
-         lambda p, s: (friction.Viscous(p.name, s), {"damping": p.of(p.robot.damping) + s}), _KD(0.03), _KD(1.0)),
+         lambda p, s: (friction.Viscous(p.name, s), {"damping": p.of(p.robot.damping) + s}), _KD(0.03), _KD(1.0),
+         fault=_KD(2.0), unit="N m s/rad"),
     Kind("stribeck_friction", "joint",
          lambda p, s: (friction.Stribeck(p.name, s), {"stiction": 0.6 * s, "velocity": friction.STRIBECK_SPEED}),
-         _L(0.01), _L(0.2), parts=("coulomb_friction",)),
+         _L(0.01), _L(0.2), parts=("coulomb_friction",),
+         fault=_L(0.2), unit="N m, rad/s"),
     Kind("load_dependent_friction", "joint", _plain(lambda p, s: friction.LoadFriction(p.name, s), "coefficient"),
-         _fixed(0.05), _fixed(0.6)),
+         _fixed(0.05), _fixed(0.6),
+         fault=_fixed(0.6)),  # share of what the drive gives that is lost
     Kind("asymmetric_friction", "joint",
          lambda p, s: (friction.AsymmetricFriction(p.name, s, 0.25 * s) if p.draw["sign"] > 0
                        else friction.AsymmetricFriction(p.name, 0.25 * s, s),
-                       {"difference": 0.75 * s * p.draw["sign"]}), _L(0.01), _L(0.2), parts=("coulomb_friction",)),
+                       {"difference": 0.75 * s * p.draw["sign"]}), _L(0.01), _L(0.2), parts=("coulomb_friction",),
+         fault=_L(0.2), unit="N m"),
     Kind("armature", "joint",
          lambda p, s: (friction.Armature(p.name, p.of(p.robot.armature) * (1 + s)),
-                       {"armature": p.of(p.robot.armature) * (1 + s)}), _fixed(0.2), _fixed(4.0)),
+                       {"armature": p.of(p.robot.armature) * (1 + s)}), _fixed(0.2), _fixed(4.0),
+         fault=_fixed(4.0), unit="kg m^2"),  # five times the declared rotor
     Kind("motor_strength", "joint", lambda p, s: (drives.Strength(p.j, 1 - s), {"factor": 1 - s}),
-         _fixed(0.03), _fixed(0.6)),
-    Kind("kp", "joint", _gain(True, False), _fixed(0.03), _fixed(0.5)),
-    Kind("kd", "joint", _gain(False, True), _fixed(0.05), _fixed(0.6)),
+         _fixed(0.03), _fixed(0.6),
+         fault=_fixed(0.8)),  # a fifth is left
+    Kind("kp", "joint", _gain(True, False), _fixed(0.03), _fixed(0.5),
+         fault=_fixed(0.7)),
+    Kind("kd", "joint", _gain(False, True), _fixed(0.05), _fixed(0.6),
+         fault=_fixed(0.8)),
     Kind("torque_limit", "joint",
          lambda p, s: (drives.TorqueLimit(p.name, 1.05 * p.peak_torque / (1 + s)),
                        {"limit": 1.05 * p.peak_torque / (1 + s)}),
-         _fixed(0.3), _fixed(4.0)),
+         _fixed(0.3), _fixed(4.0),
+         fault=_fixed(4.0), unit="N m"),  # 21 % of what half of the motions ask for: a drive that protects itself
     Kind("torque_speed_limit", "joint",
          lambda p, s: (drives.TorqueSpeed(p.name, p.of(p.robot.limit), p.peak_speed * (0.7 + 1 / s)),
-                       {"speed": p.peak_speed * (0.7 + 1 / s)}), _fixed(2.0), _fixed(60.0)),
+                       {"speed": p.peak_speed * (0.7 + 1 / s)}), _fixed(2.0), _fixed(60.0),
+         fault=_fixed(60.0), unit="rad/s"),  # no torque left at 72 % of the usual peak speed
     Kind("command_delay", "joint", _plain(lambda p, s: signals.CommandDelay(p.name, s), "delay"),
-         _fixed(0.002), _fixed(0.04)),
+         _fixed(0.002), _fixed(0.04),
+         fault=_fixed(0.06), unit="s"),  # three control periods
     Kind("torque_lag", "joint", _plain(lambda p, s: drives.TorqueLag(p.name, s), "time"),
-         _fixed(0.002), _fixed(0.03)),
+         _fixed(0.002), _fixed(0.03),
+         fault=_fixed(0.05), unit="s"),
     Kind("encoder_delay", "joint", _plain(lambda p, s: signals.EncoderDelay(p.name, s), "delay"),
-         _fixed(0.002), _fixed(0.03), group="sensor"),
+         _fixed(0.002), _fixed(0.03), group="sensor",
+         fault=_fixed(0.03), unit="s"),
     Kind("dropped_commands", "whole", _plain(lambda p, s: signals.DroppedCommands(s), "share"),
-         _fixed(0.05), _fixed(0.5), events=1.6),
+         _fixed(0.05), _fixed(0.5), events=1.6,
+         fault=_fixed(0.6)),
     Kind("encoder_offset", "joint", _signed(lambda p, s: signals.EncoderOffset(p.name, s), "offset"),
-         _fixed(0.01), _fixed(0.12), group="sensor"),
+         _fixed(0.01), _fixed(0.12), group="sensor",
+         fault=_fixed(0.25), unit="rad"),  # 14 degrees: a joint calibrated by eye, or a tooth further
     Kind("imu_offset", "base", lambda p, s: (signals.ImuOffset(p.draw["axis"] % 2, p.draw["sign"] * s),
                        _two("roll", "pitch", p.draw["axis"] % 2, p.draw["sign"] * s)),
-         _fixed(0.01), _fixed(0.12), robots="g1", group="sensor"),
+         _fixed(0.01), _fixed(0.12), robots="g1", group="sensor",
+         fault=_fixed(0.12), unit="rad"),
     Kind("encoder_quantisation", "joint", _plain(lambda p, s: signals.EncoderQuantisation(p.name, s), "step"),
-         _fixed(0.003), _fixed(0.05), group="sensor"),
+         _fixed(0.003), _fixed(0.05), group="sensor",
+         fault=_fixed(0.10), unit="rad"),  # 63 steps a turn
     Kind("backlash", "joint",
          lambda p, s: (gears.Backlash(p.name, s, p.draw["sign"] > 0), {"gap": s, "encoder": _read(p)}),
-         _fixed(0.01), _fixed(0.12)),
+         _fixed(0.01), _fixed(0.12),
+         fault=_fixed(0.15), unit="rad"),
     Kind("series_elasticity", "joint",
          lambda p, s: (gears.Elastic(p.name, 1 / s, p.draw["sign"] > 0),
                        {"stiffness": 1 / s, "encoder": _read(p),
                         "loss": gears.LOSS * np.sqrt(gears.ROTOR * p.of(p.robot.armature) * s),
                         "share": 1 - gears.ROTOR}),
          lambda p: 0.1 / p.of(p.robot.kp), _softest,
-         least=lambda p: 0.02 / p.of(p.robot.kp)),
+         least=lambda p: 0.02 / p.of(p.robot.kp),
+         fault=lambda p: 0.5 / p.of(p.robot.kp), unit="N m/rad"),  # a shaft twice as stiff as the servo
     Kind("cogging", "joint", lambda p, s: (friction.Cogging(p.name, s, p.draw["number"]),
                        {"sine": s, "cosine": 0.0, "periods": float(p.draw["number"])}),
-         _L(0.01), _L(0.15)),
-    Kind("joint_spring", "joint", 
-         lambda p, s: (friction.Spring(p.name, s), {"stiffness": s, "preload": 0.0}), _KP(0.03), _KP(0.6)),
-    Kind("hysteresis", "joint", 
+         _L(0.01), _L(0.15),
+         fault=_L(0.15), unit="N m"),
+    Kind("joint_spring", "joint",
+         lambda p, s: (friction.Spring(p.name, s), {"stiffness": s, "preload": 0.0}), _KP(0.03), _KP(0.6),
+         fault=_KP(1.0), unit="N m/rad"),
+    Kind("hysteresis", "joint",
          lambda p, s: (friction.Hysteresis(p.name, s), {"amplitude": s, "width": friction.REACH, "dahl": 1.0}),
-         _L(0.01), _L(0.15)),
-    Kind("link_mass", "body", _mass, _fixed(0.1), _fixed(1.5), group="mass"),
+         _L(0.01), _L(0.15),
+         fault=_L(0.15), unit="N m, rad"),
+    Kind("link_mass", "body", _mass, _fixed(0.1), _fixed(1.5), group="mass",
+         fault=lambda p: min(max(1.5 * p.robot.mass[p.name], 3.0), 10.0) / p.robot.mass[p.name],
+         unit="kg"),  # 3 kg in a hand, 10 on the back
     Kind("link_com", "body",
          lambda p, s: (bodies.Com(p.name, p.draw["axis"], p.draw["sign"] * s),
-                       _shifted(p, s)), _fixed(0.01), _fixed(0.08), group="mass"),
+                       _shifted(p, s)), _fixed(0.01), _fixed(0.08), group="mass",
+         fault=_fixed(0.08), unit="m"),
     Kind("link_inertia", "body", lambda p, s: (bodies.Inertia(p.name, 1 + s), _moments(p, 1 + s)),
-         _fixed(0.3), _fixed(4.0), group="mass"),
+         _fixed(0.3), _fixed(4.0), group="mass",
+         fault=_fixed(4.0), unit="kg m^2"),
     Kind("ground_friction", "whole",
          lambda p, s: (bodies.GroundFriction(1 / (1 + s)), {"friction": 1 / (1 + s)}),
-         _fixed(1.0), _fixed(6.0), robots="g1", group="contact"),
+         _fixed(1.0), _fixed(6.0), robots="g1", group="contact",
+         fault=_fixed(6.0)),  # a coefficient of 0.14: ice
     Kind("ground_compliance", "whole",
          lambda p, s: (bodies.GroundCompliance(0.02 * (1 + s)), {"time": 0.02 * (1 + s)}),
-         _fixed(0.3), _fixed(4.0), robots="g1", group="contact"),
+         _fixed(0.3), _fixed(4.0), robots="g1", group="contact",
+         fault=_fixed(4.0), unit="s"),
     Kind("ground_slope", "whole", lambda p, s: (bodies.Slope(p.draw["axis"] % 2, p.draw["sign"] * s),
                        _turned(p.draw["axis"] % 2, p.draw["sign"] * s)),
-         _fixed(0.01), _fixed(0.08), robots="g1", group="contact"),
+         _fixed(0.01), _fixed(0.08), robots="g1", group="contact",
+         fault=_fixed(0.10), unit="rad"),
     Kind("thermal_fade", "joint", _plain(lambda p, s: drives.Fade(p.name, p.of(p.robot.limit), s), "rate"),
-         _fixed(0.3), _fixed(1.0)),
-    Kind("strength_drift", "joint", _plain(lambda p, s: drives.Drift(p.name, s), "rate"), _fixed(0.01), _fixed(0.1)),
+         _fixed(0.3), _fixed(1.0),
+         fault=_fixed(5.0), unit="1/s"),
+    Kind("strength_drift", "joint", _plain(lambda p, s: drives.Drift(p.name, s), "rate"), _fixed(0.01), _fixed(0.1),
+         fault=_fixed(0.10), unit="1/s"),
     Kind("external_wrench", "body", _wrench, _fixed(0.5), lambda p: 0.25 * 9.81 * sum(p.robot.mass.values()),
-         group="contact"),
+         group="contact",
+         fault=lambda p: 0.12 * 9.81 * sum(p.robot.mass.values()), unit="N, N m"),  # 39 N: a cable that pulls
 )  # fmt: skip
 
 OUTSIDE: tuple[Kind, ...] = (
     Kind("position_friction", "joint", lambda p, s: (outside.PositionFriction(p.name, s), {"level": s}),
-         _L(0.01), _L(0.15), depends=("position",)),
+         _L(0.01), _L(0.15), depends=("position",),
+         fault=_L(0.15), unit="N m"),
     Kind("odd_cogging", "joint", lambda p, s: (outside.OddCogging(p.name, s), {"amplitude": s}),
-         _L(0.01), _L(0.12), depends=("position",)),
+         _L(0.01), _L(0.12), depends=("position",),
+         fault=_L(0.12), unit="N m"),
     Kind("gain_cycle", "joint", lambda p, s: (outside.GainCycle(p.name, s), {"share": s}),
-         _fixed(0.03), _fixed(0.5), depends=("time",)),
+         _fixed(0.03), _fixed(0.5), depends=("time",),
+         fault=_fixed(0.8)),
     Kind("cross_coupling", "joint",
          lambda p, s: (outside.CrossCoupling(p.name, p.draw["other"], s), {"stiffness": s}),
-         _KP(0.03), _KP(0.3), depends=("another joint", "other")),
+         _KP(0.03), _KP(0.3), depends=("another joint", "other"),
+         fault=_KP(0.6), unit="N m/rad"),
     Kind("tendon", "joint", lambda p, s: (outside.Tendon(p.name, s, 0.1), {"stiffness": s}),
-         _KP(0.03), _KP(0.5), depends=("position",)),
+         _KP(0.03), _KP(0.5), depends=("position",),
+         fault=_KP(1.0), unit="N m/rad"),
     Kind("dwell_friction", "joint", lambda p, s: (outside.DwellFriction(p.name, s), {"level": s}),
-         _L(0.01), _L(0.2), depends=("history", "velocity", "time")),
+         _L(0.01), _L(0.2), depends=("history", "velocity", "time"),
+         fault=_L(0.2), unit="N m"),
     Kind("rate_limit", "joint", lambda p, s: (outside.RateLimit(p.name, p.peak_rate / (1 + s)),
                                               {"rate": p.peak_rate / (1 + s)}),
          _fixed(0.2), _fixed(5.0), parts=("command_rate_limit",),
-         depends=("command", "history", "velocity", "target")),
+         depends=("command", "history", "velocity", "target"),
+         fault=_fixed(5.0), unit="rad/s"),  # a sixth of the usual peak rate
     Kind("quantised_command", "joint", lambda p, s: (outside.QuantisedCommand(p.name, s), {"step": s}),
-         _fixed(0.01), _fixed(0.2), depends=("command", "target")),
+         _fixed(0.01), _fixed(0.2), depends=("command", "target"),
+         fault=_fixed(0.20), unit="rad"),
     Kind("loose_mount", "base", lambda p, s: (outside.LooseMount(1 / s), {"stiffness": 1 / s}),
          _fixed(1e-4), _fixed(1 / 300), least=_fixed(1e-5), robots="arm",
-         depends=("another joint", "other", "history", "torque")),
+         depends=("another joint", "other", "history", "torque"),
+         unit="N m/rad"),
     Kind("drag", "joint", lambda p, s: (outside.Drag(p.name, s), {"drag": s}),
-         _KD(0.01), _KD(0.5), parts=("quadratic_friction",), depends=("velocity",)),
+         _KD(0.01), _KD(0.5), parts=("quadratic_friction",), depends=("velocity",),
+         fault=_KD(0.5), unit="N m s^2/rad^2"),  # more is not stable at 1 ms in a fall
     Kind("dead_band", "joint", lambda p, s: (outside.DeadBand(p.name, s), {"band": s}),
-         _fixed(0.005), _fixed(0.08), depends=("torque", "command", "target", "error")),
+         _fixed(0.005), _fixed(0.08), depends=("torque", "command", "target", "error"),
+         fault=_fixed(0.10), unit="rad"),
     Kind("ripple", "joint", lambda p, s: (outside.Ripple(p.name, s), {"amplitude": s}),
-         _L(0.01), _L(0.15), depends=("time",)),
+         _L(0.01), _L(0.15), depends=("time",),
+         fault=_L(0.15), unit="N m"),
 )  # fmt: skip
 
 LATER: tuple[Kind, ...] = (
     Kind("command_filter", "joint", _plain(lambda p, s: setpoints.CommandFilter(p.name, s), "time"),
-         _fixed(0.003), _fixed(0.08)),
+         _fixed(0.003), _fixed(0.08),
+         fault=_fixed(0.08), unit="s"),  # four control periods
     Kind("command_rate_limit", "joint",
-         _plain_of(lambda p, s: p.peak_rate / (0.7 + s), setpoints.CommandRateLimit, "rate"), _fixed(0.2), _fixed(5.0)),
+         _plain_of(lambda p, s: p.peak_rate / (0.7 + s), setpoints.CommandRateLimit, "rate"), _fixed(0.2), _fixed(5.0),
+         fault=_fixed(5.0), unit="rad/s"),
     Kind("command_profile", "joint",
          _plain_of(lambda p, s: max(p.peak_rate, 0.1) / s, setpoints.CommandProfile, "acceleration", speed=1e3),
-         _fixed(0.06), _fixed(0.3), least=_fixed(0.05)),  # below it is a delay of a few milliseconds
+         _fixed(0.06), _fixed(0.3), least=_fixed(0.05),
+         fault=_fixed(0.3), unit="rad/s^2, rad/s"),  # 0.05: a delay of some milliseconds; 0.3 s to the usual peak rate
     Kind("quadratic_friction", "joint", _plain(lambda p, s: outside.Drag(p.name, s), "coefficient"),
-         _KD(0.01), _KD(0.5)),
+         _KD(0.01), _KD(0.5),
+         fault=_KD(0.5), unit="N m s^2/rad^2"),  # more is not stable at 1 ms in a fall
 )  # fmt: skip
 """Kinds of the catalogue that came after the first suites: their cases stand behind those of the others, whose numbers
 and draws stay as they were."""
 
+
+
+def _beside_their_laws() -> Iterator[Kind]:
+    package = __name__.rpartition(".")[0]
+    for found in pkgutil.iter_modules(import_module(package).__path__, f"{package}."):
+        if found.name != __name__:
+            yield from getattr(import_module(found.name), "KINDS", ())
+
+
+LATER += tuple(_beside_their_laws())
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (*CATALOGUE, *OUTSIDE, *LATER)}
-
-
-def fits(kind: Kind, robot: str) -> bool:
-    """Whether a kind can sit on a robot (`arm`, or a G1)."""
-    return kind.robots == "both" or (kind.robots == "arm") == (robot == "arm")
-
-
-def places(kind: Kind, robot: Declared) -> tuple[str, ...]:
-    """Names where a kind can sit; ("",) where it has the whole robot or its base."""
-    if kind.on == "joint":
-        return robot.joints
-    if kind.on == "body":
-        return tuple(b for b in robot.bodies if robot.mass[b] >= 0.25)
-    return ("pelvis",) if kind.name == "imu_offset" else ("",)

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.traits import ABRUPT, INVERSE, TRAITS
+from bumblebee.diagnosis.candidates.traits import ABRUPT, INVERSE
 from bumblebee.diagnosis.thresholds.candidates import CandidateLimits
-from bumblebee.sim.effects import CATALOGUE, Effect, physical_inertia, single
+from bumblebee.sim.effects import CATALOGUE, Effect, single
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,12 @@ class Candidate:
 
     def clip(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
         """`values` within physical bounds."""
-        kinds = CATALOGUE[self.effect].parameters
-        low, high = (np.array([getattr(p, side) for p in kinds]) for side in ("lower", "upper"))
+        kind = CATALOGUE[self.effect]
+        low, high = kind.bounds(self.nominal, self.limits)
         if self.effect in INVERSE:
             # An infinitely stiff shaft cannot be simulated.
             low[0], high[0] = max(1.0 / high[0], self.limits.stiffest * abs(self.step[0])), 1.0 / low[0]
-        if self.effect == "link_inertia":
-            low = np.maximum(low, self.limits.point * np.array(self.nominal))
-        if self.effect == "surface_contact":
-            high[-1] = self.limits.contact_friction
-        inside = np.clip(np.asarray(values, dtype=float), low, high)
-        return physical_inertia(inside) if self.effect == "link_inertia" else inside
+        return kind.physical(np.clip(np.asarray(values, dtype=float), low, high))
 
     def moved(self, index: int, steps: float) -> np.ndarray:
         """First-trial parameters with only the free one number `index` away from nominal, by so many steps."""
@@ -80,13 +75,13 @@ def label(c: Candidate) -> dict[str, Any]:
 
 def is_simulated(c: Candidate, joints: int) -> bool:
     """Whether a candidate's column is simulated: where it is no torque, or where one can afford it to be exact."""
-    column = TRAITS[c.effect].column
+    column = CATALOGUE[c.effect].column
     return column == "simulated" or (column == "late" and (not c.where or joints <= c.limits.few_joints))
 
 
 def shortlisted(c: Candidate, joints: int) -> bool:
     """Whether a candidate costs too much to be simulated on every joint: only those worst explained are tried."""
-    return c.effect in ABRUPT or (TRAITS[c.effect].costly and joints > c.limits.few_joints)
+    return c.effect in ABRUPT or (CATALOGUE[c.effect].costly and joints > c.limits.few_joints)
 
 
 def without(effects: Sequence[Effect], candidate: Candidate) -> list[Effect]:

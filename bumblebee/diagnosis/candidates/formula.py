@@ -13,7 +13,7 @@ DISCOVERED = "discovered"
 
 @dataclass(frozen=True)
 class Formula(Candidate):
-    """Terms of `sim.effects.terms` on one joint; parameters (P,) are their coefficients, absent at 0."""
+    """Terms of `effects.terms` on one joint; parameters (P,) are their coefficients, absent at 0."""
 
     texts: tuple[str, ...] = ()
 

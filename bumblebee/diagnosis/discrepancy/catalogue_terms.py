@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, Formula
-from bumblebee.diagnosis.discrepancy.catalogue_laws import LAWS
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.simulation import Plant, declared_values
 from bumblebee.diagnosis.thresholds.discrepancy import CatalogueTerms
-from bumblebee.sim.effects import read_term
+from bumblebee.effects.law import Law
+from bumblebee.sim.effects import CATALOGUE, read_term
 from bumblebee.sim.servo import servos_of
 
 _NAMES = {"u": "target", "tau": "torque", "t": "time", "q": "position", "v": "velocity"}
@@ -25,15 +25,15 @@ def stiffer_than_the_drive(plant: Plant, own: Formula, values: np.ndarray, rule:
 
 def in_terms(plant: Plant, fit: Fit, candidate: Candidate) -> dict[str, float]:
     """Terms that are the same torque as a chosen effect of the catalogue; {} where the language has none."""
-    law = LAWS.get(candidate.effect)
-    if law is None or law.terms is None:
+    law = CATALOGUE[candidate.effect].law
+    if not isinstance(law, Law) or law.terms is None:
         return {}
     found = law.terms(fit.of(candidate), np.array(declared_values(plant, candidate.effect, candidate.where)))
     return {text: float(value) for text, value in found.items()}
 
 
 def quantities_of(texts: Sequence[str]) -> tuple[str, ...]:
-    """Quantities that terms depend on: of `catalogue_laws.QUANTITIES`, and "another joint (NAME)"."""
+    """Quantities that terms depend on: of `effects.law.QUANTITIES`, and "another joint (NAME)"."""
     found: list[str] = []
     for term in map(read_term, texts):
         found += [f"another joint ({other})" for other in term.others]
@@ -50,4 +50,5 @@ def related(texts: Sequence[str], effect: str) -> bool:
             kinds.add("friction(")
         elif "[" not in text and "u" not in text.replace("curve", "") and "t" not in text.replace("tanh", ""):
             kinds |= {name for name in ("q", "v") if name in text.replace("curve", "")}
-    return effect in LAWS and LAWS[effect].family in kinds
+    law = CATALOGUE[effect].law if effect in CATALOGUE else ""
+    return isinstance(law, Law) and law.family in kinds

@@ -47,7 +47,7 @@ class Quantities:
         return float(np.median(np.diff(self.windows.command_time, axis=1)))
 
     def values(self, joint: int) -> Mapping[str, np.ndarray]:
-        """The names of `sim.effects.terms` as a joint sees them, each (W, K)."""
+        """The names of `effects.terms` as a joint sees them, each (W, K)."""
         return _Values(self, joint)
 
     def torque(self, term: Term, joint: int) -> np.ndarray:

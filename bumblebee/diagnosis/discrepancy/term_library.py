@@ -1,4 +1,4 @@
-"""The basis functions of a missing torque: terms of `sim.effects.terms` that belong together, simplest first.
+"""The basis functions of a missing torque: terms of `effects.terms` that belong together, simplest first.
 
 Some of them are effects of the catalogue in other words (dry and viscous friction, springs, one harmonic of cogging,
 gains ...). They compete with the others, so that what the search did not accept is not taken for something new, but no
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.discrepancy.catalogue_laws import LAWS, QUANTITIES, waves
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
 from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
-from bumblebee.sim.effects import Term, read_term
+from bumblebee.effects.law import QUANTITIES, Law, waves
+from bumblebee.sim.effects import CATALOGUE, Term, read_term
 
 _MOST_TARGET_STEPS = 250.0
 """Steps over its range at most of a target that arrives in steps."""
@@ -81,8 +81,8 @@ def basis_functions(data: Quantities, joint: int) -> list[BasisFunction]:
 def _catalogue(data: Quantities, j: int) -> Iterator[BasisFunction]:
     """Basis functions that effects of the catalogue look like on one joint."""
     driven = bool(np.ptp(data.tau[..., j]) > 0)
-    for kind, law in LAWS.items():
-        if driven or not law.driven:
+    for kind, law in ((name, kind.law) for name, kind in CATALOGUE.items()):
+        if isinstance(law, Law) and (driven or not law.driven):
             for texts, on, cost, *inner in law.rows(data, j):
                 yield BasisFunction(texts, on, cost, kind, *inner)
 

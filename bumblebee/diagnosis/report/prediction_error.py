@@ -26,7 +26,7 @@ from bumblebee.diagnosis.simulation import (
     select,
 )
 from bumblebee.diagnosis.thresholds.report import PredictionError
-from bumblebee.sim.units import joint_unit
+from bumblebee.effects.units import joint_unit
 
 HORIZONS = ("0.02", "0.2", "1.0")
 

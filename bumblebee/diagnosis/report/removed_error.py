@@ -15,7 +15,7 @@ import numpy as np
 from bumblebee.diagnosis.report.prediction_error import HorizonWindows, Residuals, widened, with_interval
 from bumblebee.diagnosis.simulation import Plant, members, pick
 from bumblebee.diagnosis.thresholds.report import Matters
-from bumblebee.sim.units import joint_unit
+from bumblebee.effects.units import joint_unit
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,6 @@ from bumblebee.diagnosis.sensitivities.impulse_responses import Path
 from bumblebee.diagnosis.simulation import Plant, Windows, at_starts, at_ticks, lagged, read_at
 from bumblebee.sim.servo import Servos
 
-LATE = ("torque_lag", "encoder_delay")
-
 
 class Late:
     """Torques and readings of the W windows' J joints along simulated paths of K steps."""

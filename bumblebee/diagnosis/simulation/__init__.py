@@ -16,7 +16,7 @@ from bumblebee.diagnosis.simulation.cache import Changes, Recall
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.condition_plants import make_plants
 from bumblebee.diagnosis.simulation.conditions import Condition, in_words
-from bumblebee.diagnosis.simulation.declared import declared_values, touching
+from bumblebee.diagnosis.simulation.declared import declared_values, spot
 from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED, REFUSALS, effects_in_words
 from bumblebee.diagnosis.simulation.joint_path import joint_path
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant, plant_by, refuse_unlogged
@@ -112,8 +112,8 @@ __all__ = [
     "setpoints_of",
     "simulated_readings",
     "smallest_moves",
+    "spot",
     "state_before",
-    "touching",
     "unit_on",
     "vary",
     "vary_or_refuse",

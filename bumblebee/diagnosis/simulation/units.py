@@ -10,8 +10,8 @@ from typing import Any
 import mujoco
 
 from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.effects.units import joint_unit
 from bumblebee.sim.effects import CATALOGUE
-from bumblebee.sim.units import joint_unit
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 KINDS = {"hinge": False, "slide": True}

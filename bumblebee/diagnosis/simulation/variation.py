@@ -7,19 +7,23 @@ from dataclasses import dataclass, field, replace
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.simulation.declared import spot
 from bumblebee.diagnosis.simulation.failures import REFUSALS, effects_in_words
-from bumblebee.diagnosis.simulation.in_place import WRITE, Target
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
 from bumblebee.diagnosis.simulation.setpoints import SetPoint, setpoints_of
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects import CATALOGUE, SETPOINTS, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
+from bumblebee.sim.effects import (
+    CATALOGUE,
+    SETPOINTS,
+    Effect,
+    RuntimeHooks,
+    add_to_spec,
+    in_order,
+    native,
+    runtime_hooks,
+)
 
-_ORDER = tuple(CATALOGUE)
-# Effects that change the layout of MuJoCo's state or model: they are compiled, once for each set of places.
-STRUCTURAL = ("backlash", "series_elasticity", "hysteresis", "surface_contact")
 _NO_STATE = ("surface_contact",)
-# Effects after which constants that derive from the model are computed again.
-_NEW_CONSTANTS = ("armature", "link_mass", "link_com", "link_inertia", *STRUCTURAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,14 +123,16 @@ def _alone(plant: Plant, effects: Sequence[Effect]) -> Variation:
     own = _structure(plant, structural) if structural else plant
     model, delay, offset = copy.copy(own.model), plant.delay.copy(), plant.offset.copy()
     hidden = []
-    for effect in sorted(effects, key=lambda e: _ORDER.index(e.effect)):
-        for place in effect.where or _everywhere(plant, effect.effect):
-            if effect.effect in WRITE:
-                WRITE[effect.effect](Target(own, model, delay, offset, place), *effect.values())
+    for effect in in_order(effects):
+        kind = CATALOGUE[effect.effect]
+        for place in effect.where or _everywhere(plant, kind.whole):
+            if kind.added:
+                kind.write(spot(own, place, model, delay, offset), *effect.values())
             if _is_structural(effect):
                 hidden.append((effect.effect, place, effect.values()))
     _set_rotors(plant, own, model, hidden, {place for e in effects if e.effect == "armature" for place in e.where})
-    if any(effect.effect in _NEW_CONSTANTS for effect in effects):
+    kinds = [CATALOGUE[effect.effect] for effect in effects]
+    if any(kind.constants or kind.structural for kind in kinds):
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
     hooks = runtime_hooks([e for e in effects if e.effect not in SETPOINTS], model)
@@ -165,8 +171,8 @@ def _set_rotors(
 
 
 def _is_structural(effect: Effect) -> bool:
-    """Whether the effect changes the layout of MuJoCo's state; hysteresis by Dahl's law is a hook."""
-    return effect.effect in STRUCTURAL and not (effect.effect == "hysteresis" and effect.values()[2])
+    """Whether the effect changes the layout of MuJoCo's state: it is compiled, once for each set of places."""
+    return CATALOGUE[effect.effect].reshapes(effect.values())
 
 
 def _dropped(plant: Plant, hooks: RuntimeHooks) -> np.ndarray | None:
@@ -180,9 +186,9 @@ def _dropped(plant: Plant, hooks: RuntimeHooks) -> np.ndarray | None:
     return share
 
 
-def _everywhere(plant: Plant, kind: str) -> tuple[str, ...]:
+def _everywhere(plant: Plant, whole: bool) -> tuple[str, ...]:
     """The places that `where: []` stands for."""
-    if not CATALOGUE[kind].whole:
+    if not whole:
         return ("",)
     return tuple(name for name, a in zip(plant.joints, plant.actuator, strict=True) if a >= 0)
 

@@ -5,25 +5,23 @@ model; `motor_strength`, `kp` and `kd` alone are factors on the declared gains. 
 `cpu_engine` and `warp_engine`; `sim.engine_choice` chooses.
 """
 
-from bumblebee.sim.effects import native
-from bumblebee.sim.effects.catalogue import CATALOGUE, STICTION_SOLIMP, STICTION_SOLREF, Effect, Kind, is_native, single
+from bumblebee.effects import native
+from bumblebee.effects.catalogue import CATALOGUE, Effect, is_native, single
+from bumblebee.effects.kind import Kind
+from bumblebee.effects.native import SUFFIX, is_hidden, physical_inertia, sloped, spread_inertia
+from bumblebee.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS, advance
+from bumblebee.effects.terms import QUOTED, TABLE, Term, read_term
 from bumblebee.sim.effects.file import effects_yaml, read_effects, write_effects
 from bumblebee.sim.effects.forces import Memory, StepHooks, bent, history_length
 from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints, runtime_hooks
-from bumblebee.sim.effects.native import SUFFIX, is_hidden, physical_inertia, sloped, spread_inertia
-from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS, advance
-from bumblebee.sim.effects.spec import ADDED, add_to_spec
+from bumblebee.sim.effects.spec import add_to_spec, in_order
 from bumblebee.sim.effects.states import State, states_of
-from bumblebee.sim.effects.terms import QUOTED, TABLE, Term, read_term
 
 __all__ = [
-    "ADDED",
     "CATALOGUE",
     "NO_SPEED_LIMIT",
     "QUOTED",
     "SETPOINTS",
-    "STICTION_SOLIMP",
-    "STICTION_SOLREF",
     "SUFFIX",
     "TABLE",
     "Effect",
@@ -39,6 +37,7 @@ __all__ = [
     "effects_yaml",
     "history_length",
     "hook_joints",
+    "in_order",
     "is_hidden",
     "is_native",
     "native",

@@ -6,13 +6,14 @@ from typing import Any
 
 import yaml
 
+from bumblebee.effects.catalogue import CATALOGUE, Effect
+from bumblebee.effects.kind import Parameter
+from bumblebee.effects.terms import read_term
+from bumblebee.effects.units import both_units
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
 from bumblebee.io.read import read_yaml
 from bumblebee.io.write import write_file
-from bumblebee.sim.effects.catalogue import CATALOGUE, Effect, Parameter
-from bumblebee.sim.effects.terms import read_term
-from bumblebee.sim.units import both_units
 
 _LIMITS = Limits(text_bytes=1 << 20, nodes=30_000)
 _MOST = 2000  # effects of a file: a robot has some dozens of joints, the catalogue some dozens of effects

@@ -12,7 +12,6 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | encoder_delay, encoder_quantisation | the servo's torque at the old, rounded reading instead of the present one |
 | command_filter, _rate_limit, _profile | the servo's torque at its set-point (`setpoints.py`), not at the target |
 | torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
-| cogging | sine sin(periods q) + cosine cos(periods q) |
 | external_wrench | xfrc_applied |
 | hysteresis by Dahl's law | -amplitude z; dz/dt = v / width (1 - sgn(v) z) |
 | backlash, series_elasticity, encoder on the joint | the servo's torque also turns the rotor on its own hinge |
@@ -26,8 +25,9 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from bumblebee.effects.catalogue import CATALOGUE
+from bumblebee.effects.setpoints import advance
 from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints
-from bumblebee.sim.effects.setpoints import advance
 from bumblebee.sim.effects.states import states_of
 from bumblebee.sim.servo import Servos, servos_of
 
@@ -188,9 +188,8 @@ class StepHooks:
                 wanted = self.servos.torque(q, v, u, limit + np.inf)
                 asked = wanted + self._discovered(q, v, u, torque, rubs=False, drives=True)
                 applied += np.clip(asked, -limit, limit) - np.clip(wanted, -limit, limit)
-            for column, sine, cosine, periods in h.cogging:
-                angle = periods * q[:, column]
-                applied[:, column] += sine * np.sin(angle) + cosine * np.cos(angle)
+            for column, law, values in h.laws:
+                applied[:, column] += CATALOGUE[law].torque_at(q[:, column], v[:, column], *values)
             for k, (column, amplitude, _) in enumerate(h.hysteresis):
                 applied[:, column] -= amplitude * self._bent[:, k]
             self._batch.bind("qfrc_applied")[:, servos.dof] = applied

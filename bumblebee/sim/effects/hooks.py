@@ -4,18 +4,19 @@
 play and flexible shafts left out.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import mujoco
 import numpy as np
 
+from bumblebee.effects.catalogue import CATALOGUE, Effect
+from bumblebee.effects.kind import Kind
+from bumblebee.effects.native import SUFFIX, is_hidden
+from bumblebee.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS
+from bumblebee.effects.terms import Term, read_term
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects.catalogue import CATALOGUE, HOOKED, Effect
-from bumblebee.sim.effects.native import SUFFIX, is_hidden
-from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS
-from bumblebee.sim.effects.terms import Term, read_term
 
 Acts = Literal["reading", "command", "start", "target", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms"]
 """Places where a hook acts: what sensors report; which commands arrive; what is set once as a world begins; or, before
@@ -62,8 +63,8 @@ class RuntimeHooks:
     """(J,) [1/s]: loss of strength a second at the torque limit."""
     drift: np.ndarray = field(default_factory=_none)
     """(J,) [1/s]: loss of strength a second."""
-    cogging: tuple[tuple[int, float, float, float], ...] = ()
-    """(joint, sine, cosine [N m], periods a turn)."""
+    laws: tuple[tuple[int, str, tuple[float, ...]], ...] = ()
+    """(joint, effect, its parameters) of torques that follow from a joint's state, `effects.kind.Kind.torque_at`."""
     terms: tuple[tuple[int, float, Term], ...] = ()
     """(joint, coefficient, term) of discovered effects."""
     hysteresis: tuple[tuple[int, float, float], ...] = ()
@@ -114,15 +115,15 @@ _ACTS: dict[str, Acts] = {
     "speed_limit": "limit",
     "thermal": "gain",
     "drift": "gain",
-    "cogging": "torque",
+    "laws": "torque",
     "terms": "terms",
     "hysteresis": "torque",
     "rotors": "rotor",
     "wrench": "start",
     "imu": "reading",
 }
-SETPOINT_ARRAYS = dict(zip(SETPOINTS, ("filter_time", "target_rate", "profile"), strict=True))
-"""Effect on the set-point -> its array."""
+SETPOINT_ARRAYS = ("filter_time", "target_rate", "profile")
+"""Arrays of what drives make of their targets."""
 _FIELDS = [f.name for f in fields(RuntimeHooks) if f.name not in ("joints", "dropped_together")]
 if unsaid := set(_FIELDS) ^ _ACTS.keys():
     raise TypeError(
@@ -153,8 +154,8 @@ def hook_joints(model: mujoco.MjModel) -> list[int]:
     return [j for j in range(model.njnt) if int(model.jnt_type[j]) in scalar and not is_hidden(model.joint(j).name)]
 
 
-class _Making:
-    """The hooks of one model while they are made; attributes are those of `RuntimeHooks`."""
+class Making:
+    """The hooks of one model while effects put theirs in; attributes are those of `RuntimeHooks`."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.model = model
@@ -166,144 +167,85 @@ class _Making:
         self.made["load_friction"] = np.zeros((count, 2))
         self.made["profile"] = np.tile((np.inf, NO_SPEED_LIMIT), (count, 1))
 
-    def column(self, kind: str, place: str) -> int:
-        """Column of the joint `place`."""
-        return _column(self.joints, kind, place)
-
     def columns(self, effect: Effect) -> Sequence[int]:
         """Columns of the joints that an effect sits on."""
-        return [self.column(effect.effect, place) for place in effect.where] or range(len(self.joints))
+        return [self._column(effect.effect, place) for place in effect.where] or range(len(self.joints))
 
+    def bodies(self, effect: Effect) -> list[int]:
+        """Ids of the bodies that an effect sits on."""
+        return [self._body(effect.effect, place) for place in effect.where]
 
-def _array(name: str) -> Callable[[_Making, Effect], None]:
-    def hook(making: _Making, effect: Effect) -> None:
-        for column in making.columns(effect):
-            making.made[name][column] = effect.value()
+    def first(self, name: str, effect: Effect) -> None:
+        """Write the first parameter into an array (J,)."""
+        self.made[name][self.columns(effect)] = effect.value()
 
-    return hook
+    def rows(self, name: str, effect: Effect) -> None:
+        """Write all parameters into an array (J, P)."""
+        self.made[name][self.columns(effect)] = effect.values()
 
+    def append(self, name: str, rows: Iterable[tuple[Any, ...]]) -> None:
+        """Add rows to a list."""
+        self.made[name] += tuple(rows)
 
-def _dropped(making: _Making, effect: Effect) -> None:
-    making.made["dropped_together"] &= not effect.where
-    _array("dropped")(making, effect)
+    def laws(self, kind: Kind, effect: Effect) -> None:
+        """Add a torque that `Kind.torque_at` gives."""
+        self.append("laws", ((column, kind.id, effect.values()) for column in self.columns(effect)))
 
+    def drop(self, effect: Effect) -> None:
+        """Lose commands: of all joints the same ones, if no effect names a joint."""
+        self.made["dropped_together"] &= not effect.where
+        self.first("dropped", effect)
 
-def _setpoint(name: str) -> Callable[[_Making, Effect], None]:
-    def hook(making: _Making, effect: Effect) -> None:
-        others = [making.made[other] for other in SETPOINT_ARRAYS.values() if other != name]
-        for column in making.columns(effect):
+    def setpoint(self, name: str, effect: Effect) -> None:
+        """Write the parameters of what a drive makes of its targets; a drive does one thing with them."""
+        others = [self.made[other] for other in SETPOINT_ARRAYS if other != name]
+        for column in self.columns(effect):
             if any(np.isfinite(np.ravel(array[column])[0]) and np.ravel(array[column])[0] for array in others):
-                joint = making.joints[column]
+                joint = self.joints[column]
                 raise BadInput(f"{effect.effect} on joint {joint!r}", f"one of {', '.join(SETPOINTS)}", "two")
-            making.made[name][column] = effect.values() if making.made[name].ndim == 2 else effect.value()
+            self.made[name][column] = effect.values() if self.made[name].ndim == 2 else effect.value()
 
-    return hook
+    def rotors(self, kind: str, effect: Effect) -> None:
+        """Add rotors whose joints the encoders read."""
+        self.append("rotors", ((self._column(kind, p), self._rotor(kind, p)) for p in effect.where))
 
+    def terms(self, effect: Effect) -> None:
+        """Add the terms of a discovered effect."""
+        for text, coefficient in effect.parameters.items():
+            term = read_term(text)
+            for other in term.others:
+                self._column(f"term {text!r}", other)
+            self.append("terms", ((column, coefficient, term) for column in self.columns(effect)))
 
-def _rows(name: str) -> Callable[[_Making, Effect], None]:
-    def hook(making: _Making, effect: Effect) -> None:
-        for column in making.columns(effect):
-            making.made[name][column] = effect.values()
+    def tilt(self, effect: Effect) -> None:
+        """Turn the base's sensor."""
+        self.bodies(effect)
+        self.made["imu"][:2] = effect.values()
 
-    return hook
+    def _column(self, kind: str, place: str) -> int:
+        if place not in self.joints:
+            raise BadInput(f"{kind} on joint {place!r}", "a hinge or slide of the model", "no such joint")
+        return self.joints.index(place)
 
+    def _rotor(self, kind: str, place: str) -> int:
+        """Address in qvel of the hinge between a joint and its rotor."""
+        joint = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, place + SUFFIX[kind])
+        if joint < 0:
+            came = "none in it"
+            raise BadInput(f"{kind} on joint {place!r}", f"a model with the joint {place + SUFFIX[kind]!r}", came)
+        return int(self.model.jnt_dofadr[joint])
 
-def _cogging(making: _Making, effect: Effect) -> None:
-    making.made["cogging"] += tuple((column, *effect.values()) for column in making.columns(effect))
-
-
-def _dahl(making: _Making, effect: Effect) -> None:
-    amplitude, width, dahl = effect.values()
-    if dahl:
-        columns = [making.column(effect.effect, place) for place in effect.where]
-        making.made["hysteresis"] += tuple((column, amplitude, width) for column in columns)
-
-
-def _rotors(making: _Making, effect: Effect) -> None:
-    if effect.values()[1]:
-        making.made["rotors"] += tuple(
-            (making.column(effect.effect, p), _rotor(making.model, effect.effect, p)) for p in effect.where
-        )
-
-
-def _discovered(making: _Making, effect: Effect) -> None:
-    making.made["terms"] += tuple(_terms(making.joints, effect))
-
-
-def _tilt(making: _Making, effect: Effect) -> None:
-    for place in effect.where:
-        _body(making.model, effect.effect, place)
-    making.made["imu"][:2] = effect.values()
-
-
-def _wrench(making: _Making, effect: Effect) -> None:
-    bodies = [_body(making.model, effect.effect, place) for place in effect.where]
-    making.made["wrench"] += tuple((body, np.array(effect.values())) for body in bodies)
-
-
-HOOKS: dict[str, Callable[[_Making, Effect], None]] = {
-    "encoder_offset": _array("encoder_offset"),
-    "encoder_quantisation": _array("encoder_step"),
-    "encoder_delay": _array("encoder_delay"),
-    "torque_lag": _array("torque_lag"),
-    "dropped_commands": _dropped,
-    **{kind: _setpoint(name) for kind, name in SETPOINT_ARRAYS.items()},
-    "stribeck_friction": _rows("stiction"),
-    "load_dependent_friction": _rows("load_friction"),
-    "torque_speed_limit": _array("speed_limit"),
-    "thermal_fade": _array("thermal"),
-    "strength_drift": _array("drift"),
-    "cogging": _cogging,
-    "hysteresis": _dahl,
-    "backlash": _rotors,
-    "series_elasticity": _rotors,
-    "imu_offset": _tilt,
-    "external_wrench": _wrench,
-    "discovered": _discovered,
-}
-"""Effect -> what it adds to the hooks, of those that plain MJCF does not carry in every form."""
-_NEEDED = {kind for kind, entry in CATALOGUE.items() if not entry.native} | HOOKED.keys()
-if unlike := _NEEDED ^ HOOKS.keys():
-    raise TypeError(
-        f"bumblebee/sim/effects/hooks.py: HOOKS needs a row each for what MJCF lacks; not so: {sorted(unlike)}"
-    )
+    def _body(self, kind: str, place: str) -> int:
+        body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, place)
+        if body < 0:
+            raise BadInput(f"{kind} on body {place!r}", "a body of the model", "no such body")
+        return body
 
 
 def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHooks:
     """The hooks that `effects` need on `model`."""
-    making = _Making(model)
+    making = Making(model)
     for effect in effects:
-        if effect.effect in HOOKS:
-            HOOKS[effect.effect](making, effect)
+        if CATALOGUE[effect.effect].hooks:
+            CATALOGUE[effect.effect].hook(making, effect)
     return RuntimeHooks(making.joints, **making.made)
-
-
-def _terms(names: tuple[str, ...], effect: Effect) -> list[tuple[int, float, Term]]:
-    found = []
-    for text, coefficient in effect.parameters.items():
-        term = read_term(text)
-        for other in term.others:
-            _column(names, f"term {text!r}", other)
-        found += [(_column(names, "discovered", place), coefficient, term) for place in effect.where]
-    return found
-
-
-def _column(names: tuple[str, ...], kind: str, place: str) -> int:
-    if place not in names:
-        raise BadInput(f"{kind} on joint {place!r}", "a hinge or slide of the model", "no such joint")
-    return names.index(place)
-
-
-def _rotor(model: mujoco.MjModel, kind: str, place: str) -> int:
-    """Address in qvel of the hinge between a joint and its rotor."""
-    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, place + SUFFIX[kind])
-    if joint < 0:
-        raise BadInput(f"{kind} on joint {place!r}", f"a model with the joint {place + SUFFIX[kind]!r}", "none in it")
-    return int(model.jnt_dofadr[joint])
-
-
-def _body(model: mujoco.MjModel, kind: str, place: str) -> int:
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, place)
-    if body < 0:
-        raise BadInput(f"{kind} on body {place!r}", "a body of the model", "no such body")
-    return body

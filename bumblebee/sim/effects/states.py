@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.sim.effects.terms import Term
+from bumblebee.effects.terms import Term
 
 _EPS = 1e-6  # [s]: clocks are sums of steps
 

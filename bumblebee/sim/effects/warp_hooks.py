@@ -12,10 +12,10 @@ import mujoco
 import torch
 from torch import Tensor
 
+from bumblebee.effects.terms import Term, _value
 from bumblebee.sim.device_arrays import DeviceArray
 from bumblebee.sim.effects.forces import _REMEMBERED, StepHooks
 from bumblebee.sim.effects.hooks import RuntimeHooks
-from bumblebee.sim.effects.terms import Term, _value
 
 _KINDS = {"fresh": torch.bool, "time": torch.float64}  # clocks that strike on time are sums of thousands of steps
 

@@ -1,7 +1,7 @@
 """A new effect of the catalogue that lacks something says so, with the file and what to add."""
 
 import functools
-import importlib
+import inspect
 from pathlib import Path
 
 import mujoco
@@ -13,15 +13,14 @@ from bumblebee.deploy.undeclared.kinds import KINDS
 from bumblebee.diagnosis.candidates.candidate import Candidate, is_simulated, shortlisted
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.candidates.exclusion import is_chosen
-from bumblebee.diagnosis.candidates.traits import TRAITS
 from bumblebee.diagnosis.residuals.problem import Problem
 from bumblebee.diagnosis.sensitivities.columns import pulse_sizes, screen
 from bumblebee.diagnosis.simulation.declared import declared_values
 from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.effects.guide import page
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects import ADDED, CATALOGUE, StepHooks, add_to_spec, runtime_hooks
+from bumblebee.sim.effects import CATALOGUE, StepHooks, add_to_spec, runtime_hooks
 from bumblebee.sim.effects.forces import _REMEMBERED
-from bumblebee.sim.effects.hooks import HOOKS
 from tests.diagnosis import arm, stander
 
 HOME = Path(__file__).parents[3]
@@ -32,12 +31,7 @@ NOT_SEARCHED = {
 NOT_DRAWN = {
     "surface_contact": "how low a robot comes depends on its motion: tests/diagnosis/selection/test_surface_contact.py",
 }
-ENUMERATE = "bumblebee/diagnosis/candidates/enumerate.py"
-SIGNATURES = "bumblebee/diagnosis/sensitivities/torque_signatures.py"
-IN_PLACE = "bumblebee/diagnosis/simulation/in_place.py"
 BESIDE_THE_MODEL = {"actuator_delay", "actuator_history"}
-EQUATIONS = ("test_effect_equations.py", "test_structural_equations.py", "test_effects.py", "test_effect_engine.py")
-VARIATION = "bumblebee/diagnosis/simulation/variation.py, or the hooks and the spec in bumblebee/sim/effects"
 
 
 @functools.cache
@@ -66,13 +60,13 @@ SEARCHED = [kind for kind in CATALOGUE if kind not in NOT_SEARCHED]
 
 @pytest.mark.parametrize("kind", SEARCHED)
 def test_every_effect_is_a_candidate_somewhere(kind: str) -> None:
-    assert candidates(kind), f"{ENUMERATE}: yield a candidate of {kind}"
+    assert candidates(kind), f"{_file(kind)}: steps: yield a candidate"
 
 
 @pytest.mark.parametrize("kind", SEARCHED)
 def test_no_candidate_changes_nothing(kind: str) -> None:
     seen = any(np.abs(problem.sensitivities([c])).max() > 0 for problem, c in candidates(kind))
-    assert seen, f"{VARIATION}: {kind} changes no prediction"
+    assert seen, f"{_file(kind)}: write, hook or torque_at: it changes no prediction"
 
 
 @pytest.mark.parametrize("kind", SEARCHED)
@@ -80,7 +74,7 @@ def test_what_is_screened_by_a_torque_has_one(kind: str) -> None:
     """A column from the torque's signature, not of zeros."""
     by_torque = [(p, c) for p, c in candidates(kind) if not (is_simulated(c, count(p)) or shortlisted(c, count(p)))]
     columns = (screen(p, [c], [], pulse_sizes(p, np.ones(count(p))))[0].values for p, c in by_torque)
-    told = f'{SIGNATURES}: the torque of {kind}, or column="simulated" in candidates/traits.py'
+    told = f'{_file(kind)}: torque, or column="simulated"'
     assert not by_torque or any(np.abs(values).max() > 0 for values in columns), told
 
 
@@ -90,8 +84,7 @@ def count(problem: Problem) -> int:
 
 @pytest.mark.parametrize("kind", SEARCHED)
 def test_every_effect_has_an_experiment_that_separates_it(kind: str) -> None:
-    told = f"bumblebee/diagnosis/candidates/traits.py: say how {kind} is told from what looks the same"
-    assert TRAITS[kind].experiment, told
+    assert CATALOGUE[kind].experiment, f"{_file(kind)}: experiment: how it is told from what looks the same"
 
 
 @pytest.mark.parametrize("kind", [k for k in SEARCHED if CATALOGUE[k].on == "joint"])
@@ -101,13 +94,11 @@ def test_the_declared_value_of_an_effect_on_a_joint_is_known(kind: str) -> None:
     assert len(values) == len(CATALOGUE[kind].parameters)
 
 
-@pytest.mark.parametrize("kind", CATALOGUE)
-def test_every_effect_stands_in_the_guide(kind: str) -> None:
-    guide = (HOME / "docs/diagnosis.md").read_text()
-    assert f"`{kind}`" in guide, f"docs/diagnosis.md: add a row for {kind} to 'What it looks for'"
+def test_the_guide_is_what_the_effects_say() -> None:
+    assert (HOME / "docs/effects.md").read_text() == page(), "python -m bumblebee.effects.guide > docs/effects.md"
 
 
-@pytest.mark.parametrize("kind", ADDED)
+@pytest.mark.parametrize("kind", [name for name, kind in CATALOGUE.items() if kind.added])
 def test_a_model_varied_in_place_is_the_one_that_the_spec_makes(kind: str) -> None:
     """Every array of the compiled model, but what `Variation` has beside it: delays, and what belongs to them."""
     compared = 0
@@ -116,7 +107,7 @@ def test_a_model_varied_in_place_is_the_one_that_the_spec_makes(kind: str) -> No
         add_to_spec(spec, [effect])
         made, varied = spec.compile(), vary(problem.plant, [effect]).model
         for name in _arrays(made):
-            told = f"{IN_PLACE}: {name} after {effect}"
+            told = f"{_file(kind)}: write: {name} after {effect}"
             np.testing.assert_allclose(getattr(varied, name), getattr(made, name), rtol=1e-6, atol=1e-9, err_msg=told)
             compared += 1
     assert compared or kind not in SEARCHED
@@ -136,7 +127,7 @@ def test_what_mjcf_cannot_carry_together_is_never_chosen_together(kind: str) -> 
     others = {o.effect: o for o in every if o.where == joint and o.effect != kind}
     for c, o in [(c, o) for c in mine[:2] for o in others.values()]:
         if not is_chosen(c, [o]):
-            told = f"bumblebee/diagnosis/candidates/traits.py: not_beside=({o.effect!r},) for {kind}"
+            told = f"{_file(kind)}: beside = ({o.effect!r},)"
             both = [c.at(c.start), o.at(o.start)]
             try:
                 add_to_spec(problem.plant.spec.copy(), both)
@@ -159,7 +150,7 @@ def test_what_hooks_carry_from_step_to_step_is_saved() -> None:
     """An array of `StepHooks` that a step has changed is remembered, or a field of the model."""
     problem, every = robots()["arm"]
     changed: set[str] = set()
-    for c in {c.effect: c for c in every if c.effect in HOOKS}.values():
+    for c in {c.effect: c for c in every if CATALOGUE[c.effect].hooks}.values():
         model = vary(problem.plant, [c.at(c.start)]).model
         batch = Batch(model, 1, 1)
         hooks = StepHooks(runtime_hooks([c.at(c.start)], model), model, batch)
@@ -177,13 +168,11 @@ def test_what_hooks_carry_from_step_to_step_is_saved() -> None:
 
 @pytest.mark.parametrize("kind", SEARCHED)
 def test_every_effect_has_an_equation_from_another_hand(kind: str) -> None:
-    written = "".join((HOME / "tests/sim" / name).read_text() for name in EQUATIONS)
-    assert f'"{kind}"' in written, f"tests/sim/{EQUATIONS[0]}: the equation of {kind}, integrated in NumPy"
-    told = f"bumblebee/deploy/undeclared/kinds.py: a law of {kind} for the sealed benchmark, sharing no code"
+    written = "".join(path.read_text() for room in ("sim", "effects") for path in (HOME / "tests" / room).glob("*.py"))
+    assert f'"{kind}"' in written, f"tests/effects/test_{kind}.py: its equation, integrated in NumPy"
+    told = f"bumblebee/deploy/undeclared: a file with a law of {kind}, sharing no code, and its row in KINDS"
     assert kind in KINDS or kind in NOT_DRAWN, told
 
 
-@pytest.mark.parametrize("module", ["compensation_rules", "stand_in_effects", "undeclared.faults"])
-def test_what_a_module_of_the_deployment_wants_of_each_effect_it_has(module: str) -> None:
-    """Each compares its table with the catalogue's, or with the sealed benchmark's, as it is imported."""
-    assert importlib.import_module(f"bumblebee.deploy.{module}")
+def _file(kind: str) -> str:
+    return str(Path(inspect.getfile(type(CATALOGUE[kind]))).relative_to(HOME))

@@ -9,7 +9,7 @@ import pytest
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
-from bumblebee.diagnosis.candidates.traits import SATURATIONS, TRAITS
+from bumblebee.diagnosis.candidates.traits import SATURATIONS
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem
@@ -18,6 +18,7 @@ from bumblebee.diagnosis.selection.score_tests import null_maxima, score_tests
 from bumblebee.diagnosis.sensitivities.columns import Columns, pulse_sizes, screen
 from bumblebee.diagnosis.sensitivities.latency_signatures import LATE
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.sim.effects import CATALOGUE
 from tests.diagnosis import arm
 
 
@@ -37,7 +38,7 @@ def made() -> tuple[Problem, list[Candidate], Columns]:
 def test_columns_of_torque_answers_are_those_of_simulations(made: tuple) -> None:
     """Same direction and size for every effect that is a torque and that these data feel."""
     problem, candidates, columns = made
-    kinds = [c for c in candidates if TRAITS[c.effect].column != "simulated" and c.effect not in SATURATIONS]
+    kinds = [c for c in candidates if CATALOGUE[c.effect].column != "simulated" and c.effect not in SATURATIONS]
     simulated, first = problem.sensitivities(kinds), 0
     cosines = {}
     for c in kinds:

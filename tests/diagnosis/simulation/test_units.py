@@ -11,8 +11,8 @@ from bumblebee.diagnosis.gap.gap import gap
 from bumblebee.diagnosis.gap.page import gap_page
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.terminal import gap_summary, summary
+from bumblebee.effects.units import both_units, joint_unit
 from bumblebee.sim.effects import CATALOGUE
-from bumblebee.sim.units import both_units, joint_unit
 from tests.diagnosis import cart
 
 SHORT = SearchConfig(most=1, trials=1, simulated=3, patience=1, shortlist=0, far=1e9, many=1e9)

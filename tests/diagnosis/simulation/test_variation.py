@@ -6,8 +6,8 @@ import pytest
 
 from bumblebee.diagnosis.simulation.plant import make_plant
 from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.effects.native import HIDDEN_ARMATURE
 from bumblebee.sim.effects import add_to_spec, single
-from bumblebee.sim.effects.native import HIDDEN_ARMATURE
 from tests.diagnosis import arm
 
 _SHAFTS = {"backlash": (0.02,), "series_elasticity": (300.0,)}

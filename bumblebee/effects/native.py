@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+import mujoco
 import numpy as np
 
 # A constant joint torque is a spring so weak and so long that its torque hardly depends on the angle.
@@ -53,6 +54,13 @@ def sloped(gravity: Sequence[float], x: float, y: float, z: float = 0.0) -> np.n
 def touch(a_type: int, a_affinity: int, b_type: int, b_affinity: int) -> bool:
     """Whether two geometries' masks let them touch."""
     return bool((a_type & b_affinity) | (b_type & a_affinity))
+
+
+def touching(model: mujoco.MjModel, ground: int) -> list[int]:
+    """Geometries that the geometry `ground` can touch."""
+    types, affinities = model.geom_contype, model.geom_conaffinity
+    pairs = ((g, touch(types[ground], affinities[ground], types[g], affinities[g])) for g in range(model.ngeom))
+    return [g for g, meet in pairs if meet and g != ground]
 
 
 def contact_names(body: str) -> tuple[str, str]:

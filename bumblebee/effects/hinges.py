@@ -12,8 +12,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from bumblebee.effects import native
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects import native
 
 _LEAST_GAP = 1e-9  # [rad]: MuJoCo takes no range of no width
 

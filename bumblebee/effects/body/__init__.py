@@ -1,0 +1,1 @@
+"""What a link weighs, and what pulls at it."""

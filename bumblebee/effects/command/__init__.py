@@ -1,0 +1,1 @@
+"""What becomes of a command before the servo follows it."""

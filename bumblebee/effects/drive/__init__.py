@@ -1,0 +1,1 @@
+"""What a drive does with its gains and its torque."""

@@ -1,0 +1,1 @@
+"""What rubs on a joint."""

@@ -1,0 +1,1 @@
+"""What has no name of its own."""

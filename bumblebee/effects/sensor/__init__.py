@@ -1,0 +1,1 @@
+"""What a sensor reports that is not so."""

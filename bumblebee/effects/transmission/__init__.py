@@ -1,0 +1,1 @@
+"""What lies between a motor and its link."""

@@ -1,0 +1,87 @@
+"""An effect in a package of one's own, the file as docs/adding-an-effect.md has it: found, simulated, named, undone."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[2]
+LOOK = """
+import json, sys
+import numpy as np
+from bumblebee.deploy.compensation_plan import compensate
+from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.sim.effects import CATALOGUE, single
+from tests.diagnosis import arm
+from tests.sim.hinge import check, reference, servo
+
+check([single("hose_pull", "j", 60.0, 0.1)], reference(lambda t, q, v: servo(t, q, v) - 60.0 * (q - 0.1) ** 3))
+(done,) = compensate([single("hose_pull", "left_knee_joint", 4.0, -0.2)]).terms
+joint, stiffness, rest = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
+here = (np.array(arm.JOINTS) == joint).astype(float)
+logs = arm.simulate({}, count=4, seed=5, passive=lambda q, v: -stiffness * (q - rest) ** 3 * here)
+print(json.dumps({"undone": done, "found": diagnose(arm.session_of(logs), arm.SMALL).document["effects"]}))
+"""
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the package, as an installation leaves it."""
+    home = tmp_path_factory.mktemp("site")
+    page = (HOME / "docs/adding-an-effect.md").read_text()
+    blocks = {name: text for name, text in re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```', page, re.M | re.S)}
+    (home / "lab_effects").mkdir()
+    (home / "lab_effects/__init__.py").touch()
+    (home / "lab_effects/hose_pull.py").write_text(blocks["hose_pull.py"])
+    ((name, module),) = re.findall(r'^(\w+) = "([\w.]+)"$', blocks["pyproject.toml"], re.M)
+    info = home / "lab_effects-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-effects\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[bumblebee.effects]\n{name} = {module}\n")
+    return home
+
+
+def run(package: Path, *arguments: str) -> subprocess.CompletedProcess:
+    paths = os.pathsep.join([str(package), str(HOME), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=HOME, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("joint", "stiffness", "rest"), [("j2", 4.0, 0.2)])
+def test_it_is_found_by_its_name_with_its_size(package: Path, joint: str, stiffness: float, rest: float) -> None:
+    done = run(package, "-c", LOOK, joint, str(stiffness), str(rest))
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["undone"][1:] == [-4.0, "(q + 0.2)^3"]
+    first = told["found"][0]
+    assert (first["effect"], first["where"], len(told["found"])) == ("hose_pull", [joint], 1)
+    for name, truth in (("stiffness", stiffness), ("rest", rest)):
+        low, high = first["parameters"][name]["ci95"]
+        assert low < truth < high and high - low < 0.1 * truth
+
+
+@pytest.mark.parametrize(
+    ("line", "instead", "told"),
+    [
+        ("    native, absent = False, 0.0\n", "    native = False\n", "absent, or declared"),
+        ("    def torque_at(", "    def torque_of(", "hook, or torque_at"),
+        ("    law = ", "    remark = ", "law: its law in terms, or why there is none"),
+        ("    def undo(", "    def redo(", "undo: how the drive undoes it, or not_undone: why not"),
+        ("    native, absent = False, 0.0\n", "    absent = 0.0\n", "add, for it says native"),
+    ],
+)
+def test_what_it_lacks_is_named_with_its_file(package: Path, line: str, instead: str, told: str) -> None:
+    file = package / "lab_effects/hose_pull.py"
+    whole = file.read_text()
+    assert line in whole
+    file.write_text(whole.replace(line, instead))
+    try:
+        done = run(package, "-c", "import bumblebee.sim.effects")
+    finally:
+        file.write_text(whole)
+    assert f"TypeError: {file}: " in done.stderr and told in done.stderr
