@@ -274,7 +274,6 @@ LATER: tuple[Kind, ...] = (
 and draws stay as they were."""
 
 
-
 def _beside_their_laws() -> Iterator[Kind]:
     package = __name__.rpartition(".")[0]
     for found in pkgutil.iter_modules(import_module(package).__path__, f"{package}."):

@@ -1,5 +1,6 @@
 """Which effects: tests, trials, proposals and swaps, one after the other until nothing pays."""
 
+from bumblebee.diagnosis.selection.changes import Loss
 from bumblebee.diagnosis.selection.confounding import alike, detectable, rivals
 from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine, with_other_laws
 from bumblebee.diagnosis.selection.forward import Search, search
@@ -8,7 +9,6 @@ from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries, 
 from bumblebee.diagnosis.selection.proposals.surface_contact import contact_share
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.simulation_error import least_simulation_error
-from bumblebee.diagnosis.selection.state import Loss
 from bumblebee.diagnosis.selection.trial import try_one
 
 __all__ = [

@@ -10,9 +10,9 @@ from bumblebee.diagnosis.comparison import Holdout, walds
 from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection.forward import single_trials
 from bumblebee.diagnosis.selection.moves import Terms, refitted
 from bumblebee.diagnosis.selection.proposals.gain_grid import far_gains
+from bumblebee.diagnosis.selection.rounds import SINGLE, Kept, Round, ask
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.sim.effects import Effect
@@ -66,9 +66,9 @@ def leads(
 
     run.remake = shown
     run.open()
-    tried, looked = single_trials(run)
-    if not looked:
-        tried = [*tried, *run.trials()[0]]
+    now = Round(run)
+    ask(now, SINGLE, Kept())
+    tried = now.tried if now.looked else [*now.tried, *run.trials()[0]]
     found = []
     cheapest: dict[tuple[str, str], Trial] = {}
     for trial in sorted(tried, key=lambda t: t.cost):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from bumblebee.diagnosis.comparison import (
 from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, resolved
 from bumblebee.diagnosis.residuals import Problem, screening_windows, window_weights
+from bumblebee.diagnosis.selection.changes import Loss
 from bumblebee.diagnosis.selection.moves import Move, Now, Terms, refitted
 from bumblebee.diagnosis.selection.proposals.surface_contact import is_still_confirmed
 from bumblebee.diagnosis.selection.score_tests import Scores, least_z, score_tests
@@ -253,24 +254,3 @@ class SearchState:
                 self.say(f"removed as redundant: {c.effect} on {c.where}")
                 rest = self.fit.without([c])
                 self.fit = refit(rest.chosen, rest.values)
-
-
-@dataclass(frozen=True, eq=False)
-class Loss:
-    """Commands that were lost on all joints at once or on one."""
-
-    where: str
-    """Joint, "" for all at once."""
-    share: float
-    ci95: tuple[float, float]
-    gain: float
-    """Log-likelihood on the fitted windows, of this share against none."""
-    paid: float
-    """Loss on the validation windows; infinite where there are none."""
-    explains: float
-    """Share of the held-out excess of chi-square that goes with the commands that arrived."""
-
-    @property
-    def effect(self) -> Effect:
-        """As a value; without a place it is the whole robot's."""
-        return Effect("dropped_commands", (self.where,) if self.where else (), {"share": self.share})

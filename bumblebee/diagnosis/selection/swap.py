@@ -30,6 +30,7 @@ from bumblebee.diagnosis.comparison import (
     linear_cost,
 )
 from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.selection.changes import Asking, Taken, Vain
 from bumblebee.diagnosis.selection.moves import Move, Terms, by_loss, by_slopes, refitted
 from bumblebee.diagnosis.selection.proposals.drive_grid import limit_swaps
 from bumblebee.diagnosis.selection.proposals.hysteresis_law import law_swaps
@@ -43,16 +44,17 @@ from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.sensitivities import Columns
 
 
-def swap(run: SearchState) -> bool:
+def swap(run: SearchState) -> Asking[bool]:
     """Put one better name in the place of one or two of the search's; whether there was one."""
     rule, free = run.problem.thresholds.selection.swap, _free(run)
     taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= rule.few else [])
-    return _best_taken(run, chain(*(_tried(run, gone) for gone in taken), _twisted(run, free), _shaped(run, free)))
+    moves = chain(*(_tried(run, gone) for gone in taken), _twisted(run, free), _shaped(run, free))
+    return (yield from _best_taken(run, moves))
 
 
-def swap_limits(run: SearchState) -> bool:
+def swap_limits(run: SearchState) -> Asking[bool]:
     """Put a torque limit in the place of a drive that came out far weaker than declared; whether one was better."""
-    return _best_taken(run, _limited(run, _free(run)))
+    return (yield from _best_taken(run, _limited(run, _free(run))))
 
 
 def _free(run: SearchState) -> list[Candidate]:
@@ -60,20 +62,22 @@ def _free(run: SearchState) -> list[Candidate]:
     return [c for c in run.fit.chosen[run.given :] if c.effect not in SATURATIONS]
 
 
-def _best_taken(run: SearchState, moves: Iterable[Move]) -> bool:
+def _best_taken(run: SearchState, moves: Iterable[Move | Vain]) -> Asking[bool]:
     """Make the move that gains most, if any is clearly better than none."""
     rule, parameter = run.problem.thresholds.selection.swap, run.problem.thresholds.comparison.criterion.parameter
     best: tuple[float, Move] | None = None
     start = criterion(run.problem, run.fit)
     for move in moves:
+        if isinstance(move, Vain):
+            yield move
+            continue
         gain = criterion(run.problem, move.after) - start
         margin = rule.clearly * parameter if len(move.gone) == 1 else 0.0
         if gain > max(margin, best[0] if best else margin) and move.passes():
             best = gain, move
     if best is None:
         return False
-    run.take(best[1])
-    run.closed.clear()
+    yield Taken(best[1], reopens=True)
     return True
 
 
@@ -96,7 +100,7 @@ def _tried(run: SearchState, gone: Sequence[Candidate]) -> Iterator[Move]:
             yield move
 
 
-def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
+def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move | Vain]:
     """Fits with a shaft in the place of what its swing passes for, on each joint that has such a name."""
     for where in dict.fromkeys(c.where for c in free if c.where and c.effect in SHAFT_LIKE):
         if (SHAFT, where) in run.hopeless:
@@ -106,7 +110,7 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
             continue
         rest = columns_without(run.problem, run.fit, gone)
         own = linear_cost(run.problem, rest, run.weights) - linear_cost(run.problem, run.fit, run.weights)
-        run.hopeless.add((SHAFT, where))
+        yield Vain(SHAFT, where)
         least = run.problem.thresholds.selection.swap.part * own
         trial = best_elasticity(run.problem, rest, run.candidates, run.weights, where, least)
         move = _refitted(run, rest, trial) if trial else None
@@ -114,10 +118,13 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
             yield move
 
 
-def _shaped(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
+def _shaped(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move | Vain]:
     """Fits with a drive's own set-points or limit in the place of what they pass for, or a hysteresis' other law."""
-    moves = (_refitted(run, rest, trial) for rest, trial in chain(setpoint_swaps(run, free), law_swaps(run, free)))
-    return chain((move for move in moves if move), _limited(run, free))
+    for found in chain(setpoint_swaps(run, free), law_swaps(run, free)):
+        move = found if isinstance(found, Vain) else _refitted(run, *found)
+        if move:
+            yield move
+    yield from _limited(run, free)
 
 
 def _limited(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:

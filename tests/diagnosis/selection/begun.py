@@ -1,15 +1,20 @@
 """A search at its beginning, on rollouts of the arm."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from bumblebee.diagnosis.candidates import all_candidates
 from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.config import SearchConfig
+from bumblebee.diagnosis.selection.changes import Asking, Change
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.thresholds import Thresholds
 from tests.diagnosis import arm
+
+T = TypeVar("T")
 
 
 def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML, windows: int = 15) -> SearchState:
@@ -24,6 +29,18 @@ def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML, windows: int 
         return all_candidates(session.plant, session.rollouts, effects), np.full(3, 5.0)
 
     return SearchState(problem, Holdout(other), remake, SearchConfig(), lambda text: None)
+
+
+def answered(step: Asking[T], make: Callable[[Change], object] = lambda change: False) -> tuple[T, list[Change]]:
+    """What a step returns, and the changes that it asked for; `make` is told each."""
+    asked: list[Change] = []
+    while True:
+        try:
+            change = step.send(None if not asked else False)  # type: ignore[arg-type]
+        except StopIteration as end:
+            return end.value, asked
+        asked.append(change)
+        make(change)
 
 
 def large_robots() -> Thresholds:

@@ -18,6 +18,7 @@ from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
+from bumblebee.diagnosis.selection.changes import Asked, Asking, Change, Windows
 from bumblebee.diagnosis.selection.proposals.all_joints import fit as fit_module
 from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints, start
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of_large, usual_effects
@@ -25,7 +26,7 @@ from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.sim.servo import servos_of
 from tests.diagnosis import arm
-from tests.diagnosis.selection.begun import large_robots
+from tests.diagnosis.selection.begun import answered, large_robots
 
 TRUTH = {
     **{("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (1.2, 2.0, 0.8), strict=True)},
@@ -126,13 +127,26 @@ def _run_with_one_effect(power: float, whitened_at: float) -> Any:
     )
 
 
+def _took(run: SimpleNamespace, step: Asking[bool], left: float = 0.0) -> tuple[bool, list[Change]]:
+    """Play a step on a run that whitening anew leaves at `left`."""
+
+    def make(change: Change) -> None:
+        if isinstance(change, Asked):
+            run.asked_far, run.tried_many = run.asked_far or change.far, run.tried_many or not change.far
+        elif not change.begun:
+            run.power = lambda: left
+
+    return answered(step, make)
+
+
 @pytest.mark.parametrize(("power", "begins"), [(100.0, False), (400.0, True)])
 def test_one_effect_is_enough_to_begin_where_residuals_are_hundreds_of_times_the_noise(
     monkeypatch: pytest.MonkeyPatch, power: float, begins: bool
 ) -> None:
     tried: list[float] = []
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: tried.append(power))
-    assert not start.start_with_all_joints(_run_with_one_effect(power, power))  # nothing came of it
+    run = _run_with_one_effect(power, power)
+    assert not _took(run, start.start_with_all_joints(run))[0]  # nothing came of it
     assert bool(tried) is begins
 
 
@@ -143,9 +157,8 @@ def test_windows_that_were_whitened_far_from_here_are_whitened_anew_first(
     tried: list[float] = []
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: tried.append(left))
     monkeypatch.setattr(start, "whitened_anew", lambda *_: (None, None, None))
-    monkeypatch.setattr(start, "_start_anew", lambda run, *_: setattr(run, "power", lambda: left))
     run = _run_with_one_effect(400.0, 5000.0)
-    assert start.start_with_all_joints(run) is not begins  # of many effects nothing came
+    assert _took(run, start.start_with_all_joints(run), left)[0] is not begins  # of many effects nothing came
     assert bool(tried) is begins
     assert run.tried_many is begins
 
@@ -182,14 +195,15 @@ def test_a_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_
     run.weights, run.asked_far = None, case["asked_far"]
     run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=case["nv"]), floating=False)
     tried = [SimpleNamespace(cost=case["least"], candidate=SimpleNamespace(where=case["where"]))]
-    fit, begun = SimpleNamespace(power=lambda problem: case["left"], residual=None), []
+    fit = SimpleNamespace(power=lambda problem: case["left"], residual=None)
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: fit)
     monkeypatch.setattr(start, "cost_of", lambda *_: (case["cost"], None))
     monkeypatch.setattr(start, "compare", lambda *_: SimpleNamespace(passes=lambda rule: case["pays"]))
-    monkeypatch.setattr(start, "begin_with", lambda run, fit: begun.append(fit))
-    assert start.start_far_off(run, tried) is begins
-    assert bool(begun) is begins
-    assert not start.start_far_off(run, tried)  # it is asked once, and only then
+    monkeypatch.setattr(start, "whitened_anew", lambda problem, holdout, fit: (problem, holdout, fit))
+    began, asked = _took(run, start.start_far_off(run, tried))
+    assert began is begins
+    assert [change.fit for change in asked if isinstance(change, Windows)] == [fit] * begins
+    assert not _took(run, start.start_far_off(run, tried))[0]  # it is asked once, and only then
 
 
 @pytest.mark.parametrize(("nv", "asked"), [(4, True), (29, False)])
@@ -200,20 +214,19 @@ def test_a_small_robot_that_nothing_brings_nearer_is_asked_for_all_joints_sooner
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: tried.append(10.0))
     run = _run_with_one_effect(10.0, 10.0)
     run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=nv), floating=False)
-    assert not start.start_with_all_joints(run, stuck=True)
+    assert not _took(run, start.start_with_all_joints(run, stuck=True))[0]
     assert bool(tried) is asked
 
 
 def test_what_left_too_much_to_begin_with_is_asked_again_where_nothing_helps(monkeypatch: pytest.MonkeyPatch) -> None:
     """The beginning asks for next to nothing; where no effect helps it is enough that all joints pay."""
-    begun: list[Any] = []
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: "a fit")
     monkeypatch.setattr(start, "compare", lambda *_: SimpleNamespace(passes=lambda rule: True))
-    monkeypatch.setattr(start, "begin_with", lambda run, fit: begun.append(fit))
+    monkeypatch.setattr(start, "whitened_anew", lambda problem, holdout, fit: (problem, holdout, fit))
     run = _run_with_one_effect(100.0, 100.0)
     run.fit, run.asked_far = SimpleNamespace(chosen=()), True
-    assert start.start_with_all_joints(run, stuck=True)
-    assert begun == ["a fit"]
+    began, asked = _took(run, start.start_with_all_joints(run, stuck=True))
+    assert began and [change.fit for change in asked if isinstance(change, Windows)] == ["a fit"]
 
 
 def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyPatch) -> None:

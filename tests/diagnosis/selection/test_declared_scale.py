@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
+from bumblebee.diagnosis.selection.steps import go
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis.selection.test_swap import begun, names
 
@@ -48,7 +49,7 @@ def test_a_common_factor_of_strength_inertia_and_friction_is_taken_out() -> None
         ("coulomb_friction", "x"): factor * DRY, ("viscous_friction", "x"): factor * VISCOUS,
     }  # fmt: skip
     run = begun(XML.format(0, 0, MASS), record(MASS), scaled)
-    assert keep_declared_scale(run)
+    assert go(run, keep_declared_scale)
     assert names(run) == [("coulomb_friction", "x"), ("viscous_friction", "x")]
     assert run.fit.values == pytest.approx([DRY, VISCOUS], rel=0.03)
 
@@ -60,5 +61,5 @@ def test_a_drive_that_is_weak_beside_a_declared_mass_stays_weak() -> None:
         ("viscous_friction", "x"): 0.6 * VISCOUS,
     }
     run = begun(XML.format(0, 0, MASS), record(MASS / 0.6), weak)
-    assert not keep_declared_scale(run)
+    assert not go(run, keep_declared_scale)
     assert run.fit.values[0] == pytest.approx(0.6, rel=0.02)

@@ -8,6 +8,7 @@ import pytest
 
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
+from bumblebee.diagnosis.selection.steps import go
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
 from tests.diagnosis.selection.test_swap import begun, names
@@ -53,27 +54,27 @@ def one(drag: float, shares: tuple[float, float], name: str, rng: np.random.Gene
 
 def test_a_drag_beside_dry_friction_is_added_by_its_number() -> None:
     run = begun(XML, record(DRAG), {("coulomb_friction", "x"): DRY})
-    assert complete_frictions(run)
+    assert go(run, complete_frictions)
     assert names(run) == [("coulomb_friction", "x"), ("quadratic_friction", "x")]
     assert run.fit.values == pytest.approx([DRY, DRAG], rel=0.05)
 
 
 def test_dry_friction_alone_stays_alone() -> None:
     run = begun(XML, record(0.0), {("coulomb_friction", "x"): DRY})
-    assert not complete_frictions(run)
+    assert not go(run, complete_frictions)
     assert names(run) == [("coulomb_friction", "x")]
 
 
 def test_a_wrong_member_goes_when_the_right_one_has_come() -> None:
     """Damping that stands for drag."""
     run = begun(XML, record(DRAG), {("coulomb_friction", "x"): DRY, ("viscous_friction", "x"): 1.5})
-    assert complete_frictions(run)
+    assert go(run, complete_frictions)
     assert names(run) == [("coulomb_friction", "x"), ("quadratic_friction", "x")]
 
 
 def test_friction_that_goes_with_the_load_has_a_coefficient_for_each_direction_where_they_differ() -> None:
     run = begun(XML, record(0.0, 0.4, 0.2), {LOAD: (0.3, 0.0)})
-    assert complete_frictions(run)
+    assert go(run, complete_frictions)
     assert names(run) == [LOAD]
     assert run.fit.values == pytest.approx([0.3, 0.2], rel=0.1)
     (effect,) = run.fit.effects
@@ -82,7 +83,7 @@ def test_friction_that_goes_with_the_load_has_a_coefficient_for_each_direction_w
 
 def test_friction_that_goes_with_the_load_alike_both_ways_keeps_one_coefficient() -> None:
     run = begun(XML, record(0.0, 0.3, 0.3), {LOAD: (0.3, 0.0)})
-    assert not complete_frictions(run)
+    assert not go(run, complete_frictions)
     assert set(run.fit.effects[0].parameters) == {"coefficient"}
 
 
@@ -102,7 +103,7 @@ def test_a_diagnosis_says_a_difference_between_the_directions_only_where_there_i
 
 def test_a_constant_torque_that_stands_for_the_difference_goes() -> None:
     run = begun(XML, record(0.0, 0.4, 0.2), {LOAD: (0.3, 0.0), ("asymmetric_friction", "x"): 0.5})
-    assert complete_frictions(run)
+    assert go(run, complete_frictions)
     assert names(run) == [LOAD]
     assert run.fit.values == pytest.approx([0.3, 0.2], rel=0.1)
 

@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis.selection.changes import Vain
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import (
     best_elasticity,
     is_of_series,
     joint_elasticity_trials,
     series,
 )
+from bumblebee.diagnosis.selection.steps import go
 from bumblebee.diagnosis.selection.swap import swap
 from bumblebee.diagnosis.thresholds.proposals import JointElasticity
 from tests.diagnosis import arm
+from tests.diagnosis.selection.begun import answered
 from tests.diagnosis.selection.test_swap import begun, names
 from tests.diagnosis.strange_arm import simulate
 
@@ -19,11 +22,11 @@ from tests.diagnosis.strange_arm import simulate
 def test_a_shaft_takes_the_place_of_the_rotor_that_it_passed_for() -> None:
     truth = {("series_elasticity", "j2"): (600.0,)}
     run = begun(arm.XML, simulate(truth, seed=3), {("armature", "j2"): 0.015})
-    assert swap(run)
+    assert go(run, swap)
     assert names(run) == [("series_elasticity", "j2")]
     assert 1 / run.fit.values[0] == pytest.approx(600.0, rel=0.2)
     assert is_of_series(run.problem, run.fit.chosen[0], run.fit.values)
-    assert not swap(run)
+    assert not go(run, swap)
 
 
 def test_stiffnesses_get_finer_where_a_servo_on_the_joint_would_shake() -> None:
@@ -37,20 +40,21 @@ def test_stiffnesses_get_finer_where_a_servo_on_the_joint_would_shake() -> None:
 @pytest.mark.slow
 def test_a_joint_that_is_off_and_has_no_name_is_tried() -> None:
     run = begun(arm.XML, simulate({("series_elasticity", "j2"): (600.0,)}, seed=3), {})
-    found = joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+    material = (run.problem, run.fit, run.candidates, run.weights)
+    found, asked = answered(joint_elasticity_trials(*material, set()))
     assert [(t.candidate.where, t.values[1]) for t in found] == [("j2", 0.0)]
-    assert run.hopeless == {("series_elasticity", "j2")}
-    assert not joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+    assert asked == [Vain("series_elasticity", "j2")]
+    assert answered(joint_elasticity_trials(*material, {("series_elasticity", "j2")})) == ([], [])
 
 
 def test_no_shaft_explains_noise() -> None:
     run = begun(arm.XML, simulate({}, seed=3), {})
-    assert not joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, set())
+    assert answered(joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, set()))[0] == []
     assert best_elasticity(run.problem, run.fit, run.candidates, run.weights, "j2") is None
 
 
 @pytest.mark.slow
 def test_a_rotor_is_no_shaft() -> None:
     run = begun(arm.XML, arm.simulate({("armature", "j2"): 0.015}, seed=3), {("armature", "j2"): 0.013})
-    assert not swap(run)
+    assert not go(run, swap)
     assert names(run) == [("armature", "j2")]

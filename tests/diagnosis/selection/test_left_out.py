@@ -5,7 +5,7 @@ import pytest
 
 from bumblebee.diagnosis import diagnose as whole
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.selection import forward
+from bumblebee.diagnosis.selection import forward, rounds
 from tests.diagnosis.arm import SMALL, session_of, simulate
 
 
@@ -14,7 +14,9 @@ def singular(*args, **given):
 
 
 def test_a_step_of_the_search_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("saturation_trials", "backlash_trials", "joint_elasticity_trials", "swap", "find_packet_loss"):
+    for name in ("saturation_trials", "backlash_trials", "joint_elasticity_trials"):
+        monkeypatch.setattr(rounds, name, singular)
+    for name in ("swap", "find_packet_loss"):
         monkeypatch.setattr(forward, name, singular)
     monkeypatch.setattr(whole, "discover", singular)
     session = session_of(simulate({("coulomb_friction", "j2"): 0.4}, count=3))

@@ -5,6 +5,7 @@ import pytest
 from bumblebee.diagnosis.selection.proposals.all_joints.link_load import link_load
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.steps import go
 from tests.diagnosis import arm
 from tests.diagnosis.selection.begun import begun
 
@@ -27,7 +28,7 @@ def test_a_load_is_one_mass_with_or_without_friction_on_all_joints(run: SearchSt
     dry = FRICTION if friction else {}
     if friction:
         run = begun({("link_mass", "l3"): MASS, **{("coulomb_friction", j): v for j, v in dry.items()}}, windows=60)
-    assert start_with_gain_grid(run)
+    assert go(run, start_with_gain_grid)
     found = {(c.effect, c.where): float(run.fit.of(c)[0]) for c in run.fit.chosen}
     assert found["link_mass", "l3"] == pytest.approx(MASS, rel=0.02)
     for joint, size in dry.items():

@@ -7,6 +7,7 @@ import pytest
 from bumblebee.diagnosis.selection.proposals import gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.steps import go
 from tests.diagnosis import arm
 from tests.diagnosis.selection.begun import begun
 
@@ -29,7 +30,7 @@ def test_servos_far_from_the_declared_ones_would_explain_it(run: SearchState) ->
 
 
 def test_the_search_begins_with_armatures_and_friction_at_the_declared_gains(run: SearchState) -> None:
-    assert start_with_gain_grid(run)
+    assert go(run, start_with_gain_grid)
     found = {(c.effect, c.where): float(run.fit.of(c)[0]) for c in run.fit.chosen}
     for place, value in TRUTH.items():
         assert found[place] == pytest.approx(value, rel=0.15), place
@@ -40,7 +41,7 @@ def test_the_search_begins_with_armatures_and_friction_at_the_declared_gains(run
 
 def _with_gains(run: SearchState) -> None:
     """It begins with gains of a thirtieth and with no armature."""
-    assert start_with_gain_grid(run)
+    assert go(run, start_with_gain_grid)
     found = {(c.effect, c.where): float(run.fit.of(c)[0]) for c in run.fit.chosen}
     for joint in arm.JOINTS:
         assert found["kp", joint] == pytest.approx(1 / 30, rel=0.35)

@@ -16,7 +16,6 @@ from bumblebee.diagnosis.residuals.problem import Problem, make_problem
 from bumblebee.diagnosis.residuals.whitening import null_draws
 from bumblebee.diagnosis.selection.score_tests import null_maxima, score_tests
 from bumblebee.diagnosis.sensitivities.columns import Columns, pulse_sizes, screen
-from bumblebee.diagnosis.sensitivities.latency_signatures import LATE
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.sim.effects import CATALOGUE
 from tests.diagnosis import arm
@@ -83,7 +82,7 @@ def test_late_drives_and_encoders_have_columns_like_those_of_simulations(
 ) -> None:
     """Without a simulation too, as robots of many joints have them: to first order a torque and a start that moved."""
     problem, candidates, columns = made
-    late = [c for c in candidates if c.effect in LATE and c.where]
+    late = [c for c in candidates if CATALOGUE[c.effect].column == "late" and c.where]
     monkeypatch.setattr("bumblebee.diagnosis.sensitivities.columns.is_simulated", lambda c, joints: False)
     torque = scales_of(problem.plant, problem.windows.source).torque
     first_order = screen(problem, late, [], pulse_sizes(problem, torque))[0].values

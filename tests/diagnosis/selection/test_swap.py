@@ -11,6 +11,7 @@ from bumblebee.diagnosis.residuals.problem import window_weights
 from bumblebee.diagnosis.selection import confounding
 from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.steps import go
 from bumblebee.diagnosis.selection.swap import swap
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.thresholds.comparison import NoWorseWithinErrors
@@ -41,17 +42,17 @@ def names(run: SearchState) -> list[tuple[str, str]]:
 
 def test_a_wrong_name_gives_way_to_the_right_one_and_that_stays() -> None:
     run = begun(cart.xml(), cart.record(friction=(0.0, 0.05)), {("viscous_friction", "pole"): 0.03})
-    assert swap(run)
+    assert go(run, swap)
     assert names(run) == [("coulomb_friction", "pole")]
     assert run.fit.values[0] == pytest.approx(0.05, rel=0.05)
     assert [s.candidate for s in run.steps] == list(run.fit.chosen)
-    assert not swap(run)
+    assert not go(run, swap)
 
 
 def test_two_names_that_stand_for_one_give_way_to_it() -> None:
     two = {("viscous_friction", "pole"): 0.03, ("armature", "pole"): 0.001}
     run = begun(cart.xml(), cart.record(friction=(0.0, 0.05)), two)
-    assert swap(run)
+    assert go(run, swap)
     assert names(run) == [("coulomb_friction", "pole")]
 
 
@@ -59,7 +60,7 @@ def test_two_names_that_stand_for_one_give_way_to_it() -> None:
 def test_friction_that_grows_at_rest_is_found_beside_dry_friction_only_where_it_is(stiction: float) -> None:
     truth = {("coulomb_friction", "j2"): (1.0,)} | ({("stribeck_friction", "j2"): (stiction, 0.15)} if stiction else {})
     run = begun(arm.XML, simulate(truth, seed=3), {("coulomb_friction", "j2"): 1.0})
-    assert add_stribeck_friction(run) is bool(stiction)
+    assert go(run, add_stribeck_friction) is bool(stiction)
     assert [n for n, _ in names(run)] == ["coulomb_friction", *(["stribeck_friction"] if stiction else [])]
     if stiction:
         assert run.fit.of(run.fit.chosen[1])[0] == pytest.approx(stiction, rel=0.15)
@@ -69,7 +70,7 @@ def test_friction_that_grows_at_rest_is_found_beside_dry_friction_only_where_it_
 def test_friction_that_grows_at_rest_is_told_from_the_dry_friction_that_it_sits_on(level: float) -> None:
     truth = {("stribeck_friction", "j2"): (1.5, 0.15)} | ({("coulomb_friction", "j2"): (level,)} if level else {})
     run = begun(arm.XML, simulate(truth, seed=3), {("stribeck_friction", "j2"): (1.0, 0.3)})
-    add_dry_friction(run)
+    go(run, add_dry_friction)
     assert [n for n, _ in names(run)] == ["stribeck_friction", *(["coulomb_friction"] if level else [])]
     assert run.fit.of(run.fit.chosen[0])[0] == pytest.approx(1.5, rel=0.15)
     if level:

@@ -1,7 +1,7 @@
 """A motor's cogging behind a gear, of any number of periods in a turn of the joint, by slow logs and by fast ones."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.selection.proposals.torque_ripple import KIND, promising, ripple_trials
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.steps import go
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
@@ -82,16 +83,16 @@ def test_the_highest_peak_of_the_joint_that_cogs_is_there_and_no_other_joint_has
 def test_a_joint_is_asked_once_and_one_that_is_not_off_never() -> None:
     run = cogging(151.3)
     run.hopeless.clear()
-    assert [t.candidate.where for t in ripple_trials(run)] == ["j1"]
-    assert ripple_trials(run) == []
-    assert ripple_trials(begun(arm.XML, simulate({}, seed=5), {})) == []
+    assert [t.candidate.where for t in go(run, ripple_trials)] == ["j1"]
+    assert go(run, ripple_trials) == []
+    assert go(begun(arm.XML, simulate({}, seed=5), {}), ripple_trials) == []
 
 
 def test_a_ripple_that_is_faint_beside_what_was_tried_waits() -> None:
     run = cogging(151.3)
     run.hopeless.clear()
-    (trial,) = ripple_trials(run)
+    (trial,) = go(run, ripple_trials)
     run.hopeless.clear()
     much = replace(trial, cost=run.fit.cost - 100.0 * (run.fit.cost - trial.cost))
-    assert ripple_trials(run, [much]) == [] and not run.hopeless
-    assert [t.candidate.where for t in ripple_trials(run, [trial])] == ["j1"]
+    assert go(run, partial(ripple_trials, tried=[much])) == [] and not run.hopeless
+    assert [t.candidate.where for t in go(run, partial(ripple_trials, tried=[trial]))] == ["j1"]

@@ -7,7 +7,7 @@ a geometric series of gaps on those windows, and the best of them on all. Its ga
 as of `proposals.saturation`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.changes import Asking, Vain
 from bumblebee.diagnosis.selection.profile import profile, stepped
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, odd_joints
 from bumblebee.diagnosis.selection.trial import Trial
@@ -28,11 +29,11 @@ def backlash_trials(
     fit: Fit,
     candidates: Sequence[Candidate],
     weights: np.ndarray,
-    hopeless: set[tuple[str, str]],
-) -> list[Trial]:
+    hopeless: Container[tuple[str, str]],
+) -> Asking[list[Trial]]:
     """The backlash that explains most; none where none does.
 
-    Its joint and those on which none does join the `hopeless`. These are not tried again:
+    Its joint and those on which none does are then `hopeless`, (effect, joint). These are not tried again:
     a backlash that is refused now would be refused again.
     """
     clean = fit.clean(problem)
@@ -46,10 +47,11 @@ def backlash_trials(
             continue
         tried = [t for t in (_best(problem, fit, weights, usual, c, odd) for c in own) if t is not None]
         if not tried:
-            hopeless.add((KIND, where))
+            yield Vain(KIND, where)
         found += tried
     best = sorted(found, key=lambda t: t.cost)[:1]
-    hopeless.update((KIND, t.candidate.where) for t in best)
+    for t in best:
+        yield Vain(KIND, t.candidate.where)
     return best
 
 

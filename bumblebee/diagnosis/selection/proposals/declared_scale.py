@@ -13,6 +13,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.selection.changes import Asking, Refitted
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.sim.effects import CATALOGUE
 
@@ -21,7 +22,7 @@ _INERTIA = "kg"
 _FORCE = "N"
 
 
-def keep_declared_scale(run: SearchState) -> bool:
+def keep_declared_scale(run: SearchState) -> Asking[bool]:
     """Take the declared strengths of torque drives where the data do not speak against them; whether it did."""
     strong = [c for c in run.fit.chosen[run.given :] if c.effect == STRENGTH]
     if not run.problem.plant.torque_input or not strong or not _has_scale(run.fit, strong):
@@ -33,9 +34,8 @@ def keep_declared_scale(run: SearchState) -> bool:
     fit = gauss_newton(run.problem, rest.chosen, start, run.weights, rule.iterations, coarse=True, known=run.fit)
     if fit.cost > run.fit.cost + run.bound**2:
         return False
-    run.say(f"the declared strength of the drives fits as well as {factor:.3g} times it with scaled inertias; kept")
-    run.renew(fit)
-    run.prune()
+    said = f"the declared strength of the drives fits as well as {factor:.3g} times it with scaled inertias; kept"
+    yield Refitted(fit, said, pruned=True)
     return True
 
 

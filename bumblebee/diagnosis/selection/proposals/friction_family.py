@@ -16,6 +16,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.comparison import columns_without, compare, criterion, refitted_without, wald
+from bumblebee.diagnosis.selection.changes import Asking, Refitted, Taken
 from bumblebee.diagnosis.selection.moves import Move, Terms, refitted
 from bumblebee.diagnosis.selection.proposals.rubbing_joints import worth_asking
 from bumblebee.diagnosis.selection.score_tests import score_tests
@@ -33,7 +34,7 @@ MEMBERS = (
 )
 
 
-def complete_frictions(run: SearchState) -> bool:
+def complete_frictions(run: SearchState) -> Asking[bool]:
     """On every joint with a friction the sum of the family that explains it best; whether anything has changed."""
     changed = False
     rubbing = list(dict.fromkeys(c.where for c in run.fit.chosen if c.effect in MEMBERS))
@@ -42,8 +43,8 @@ def complete_frictions(run: SearchState) -> bool:
             move = _next_member(run, where) or _by_direction(run, where)
             if move is None:
                 break
-            run.take(move, rivals=len(MEMBERS))  # no further name but a number of the same friction
-            _drop_members(run, where)
+            yield Taken(move, rivals=len(MEMBERS))  # no further name but a number of the same friction
+            yield from _drop_members(run, where)
             changed = True
     return changed
 
@@ -98,7 +99,7 @@ def _promising(run: SearchState, where: str) -> Iterator[tuple[Candidate, np.nda
         yield every[open_[k]], tests.steps[k]
 
 
-def _drop_members(run: SearchState, where: str) -> None:
+def _drop_members(run: SearchState, where: str) -> Asking[None]:
     """Members that beside the last one are no longer sure, or worth their numbers; the last one stays."""
     rule = run.problem.thresholds.selection.proposals.friction_family
     rules = run.problem.thresholds.comparison
@@ -108,5 +109,4 @@ def _drop_members(run: SearchState, where: str) -> None:
         if sure and criterion(run.problem, less) < criterion(run.problem, run.fit) - rule.clearly:
             continue
         if compare(run.problem, run.holdout, run.fit, less).passes(rules.no_worse_within_errors):
-            run.say(f"removed as redundant given its other friction: {c.effect} on {where}")
-            run.renew(less)
+            yield Refitted(less, f"removed as redundant given its other friction: {c.effect} on {where}")

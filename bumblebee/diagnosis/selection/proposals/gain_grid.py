@@ -22,10 +22,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, effects_at
-from bumblebee.diagnosis.comparison import compare, evidence, walds
+from bumblebee.diagnosis.comparison import compare, walds
 from bumblebee.diagnosis.estimation import Fit, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection.proposals.all_joints import begin_with, fit_all_joints
+from bumblebee.diagnosis.selection.changes import Asking, FarOff
+from bumblebee.diagnosis.selection.proposals.all_joints import begun_with, fit_all_joints
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary
 from bumblebee.diagnosis.thresholds.proposals import GainGrid
@@ -173,7 +174,7 @@ def far_gains(run: SearchState) -> Fit | None:
     return fit if gain.passes(run.problem.thresholds.comparison.validation) else None
 
 
-def start_with_gain_grid(run: SearchState) -> bool:
+def start_with_gain_grid(run: SearchState) -> Asking[bool]:
     """Begin with servos far from the declared ones, or with the usual effects of all joints if that leaves less."""
     fit, rules = far_gains(run), run.problem.thresholds.comparison
     if fit is None:
@@ -182,13 +183,8 @@ def start_with_gain_grid(run: SearchState) -> bool:
     below = min(fit.power(run.problem), run.config.far)
     usual = fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
     if usual is not None and compare(run.problem, run.holdout, fit, usual).passes(rules.together):
-        begin_with(run, usual)
+        yield begun_with(run, usual)
         return True
     weights = window_weights(run.problem.residual([fit.effects])[0])
-    for c, z in zip(fit.chosen, walds(run.problem, fit, weights, fit.chosen), strict=True):
-        run.steps.append(evidence(c, float(z), len(run.candidates)))
-        run.say(f"found {c.effect} on {c.where}, far from the declared value: {fit.of(c).round(5)}")
-    run.screened_cost = 0.0
-    run.renew(fit)
-    run.given = len(fit.chosen)
+    yield FarOff(fit, walds(run.problem, fit, weights, fit.chosen))
     return True

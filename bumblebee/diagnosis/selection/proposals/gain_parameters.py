@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.comparison import evidence, wald
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.changes import Asking, Renamed
 from bumblebee.diagnosis.selection.state import SearchState
 
 KINDS = ("motor_strength", "kp", "kd")
@@ -73,12 +73,8 @@ def _refit(
     return gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True, known=fit)
 
 
-def merge_gain_parameters(run: SearchState) -> None:
-    """Effects on a servo's gains in their plainest form, with evidence for those that are new."""
+def merge_gain_parameters(run: SearchState) -> Asking[None]:
+    """Effects on a servo's gains in their plainest form."""
     if run.given:  # kp and kd apart from the start on
         return
-    run.fit = plain_gains(run.problem, run.fit, run.candidates, run.weights, run.bound, run.say)
-    for i, c in enumerate(run.fit.chosen):
-        if c not in {s.candidate for s in run.steps}:
-            z = wald(run.problem, run.fit, run.weights, i)
-            run.steps.append(evidence(c, z, len(run.candidates)))
+    yield Renamed(plain_gains(run.problem, run.fit, run.candidates, run.weights, run.bound, run.say))

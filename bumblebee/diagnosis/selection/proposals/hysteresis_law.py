@@ -16,6 +16,7 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.comparison import Holdout, columns_without, compare
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.changes import Vain
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.thresholds.proposals import HysteresisLaw
@@ -23,12 +24,12 @@ from bumblebee.diagnosis.thresholds.proposals import HysteresisLaw
 KIND = "hysteresis"
 
 
-def law_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[tuple[Fit, Trial]]:
+def law_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[tuple[Fit, Trial] | Vain]:
     """A fit without each hysteresis of the `free` ones, and the other law that is tried in its place."""
     for c in [c for c in free if c.effect == KIND]:
         if (KIND, c.where) in run.hopeless or not has_other_law(run.candidates, c):
             continue
-        run.hopeless.add((KIND, c.where))
+        yield Vain(KIND, c.where)
         rest = columns_without(run.problem, run.fit, [c])
         trial = _best_trial(run.problem, rest, c, run.fit.of(c), run.weights)
         if trial is not None:

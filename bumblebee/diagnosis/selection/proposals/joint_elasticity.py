@@ -7,7 +7,7 @@ inertia. A geometric series of stiffnesses tells: where an effect of that kind w
 noise. Only the best of the series is simulated on all windows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.changes import Asking, Vain
 from bumblebee.diagnosis.selection.profile import profile
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
@@ -27,11 +28,15 @@ LIKE = ("torque_lag", "encoder_delay", "command_delay", "armature", "kp", "kd", 
 
 
 def joint_elasticity_trials(
-    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, hopeless: set[tuple[str, str]]
-) -> list[Trial]:
+    problem: Problem,
+    fit: Fit,
+    candidates: Sequence[Candidate],
+    weights: np.ndarray,
+    hopeless: Container[tuple[str, str]],
+) -> Asking[list[Trial]]:
     """The elasticity that explains most on one of the joints that are furthest off; none where none does.
 
-    Each joint is tried once and joins the `hopeless`.
+    Each joint is tried once and then among the `hopeless`, (effect, joint).
     """
     rule = problem.thresholds.selection.proposals.joint_elasticity
     clean = fit.clean(problem)
@@ -42,7 +47,7 @@ def joint_elasticity_trials(
         where = problem.plant.joints[j]
         if off[j] < rule.least_errors or (KIND, where) in hopeless:
             continue
-        hopeless.add((KIND, where))
+        yield Vain(KIND, where)
         best = best_elasticity(problem, fit, candidates, weights, where)
         if best:
             return [best]

@@ -20,8 +20,9 @@ from scipy.special import logsumexp
 from bumblebee.diagnosis.comparison import Holdout, criterion
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.selection.changes import Asking, Loss, Lost
 from bumblebee.diagnosis.selection.proposals.setpoints import explains_more
-from bumblebee.diagnosis.selection.state import Loss, SearchState
+from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.simulation import Windows, residuals, vary
 from bumblebee.diagnosis.thresholds.proposals import PacketLoss
 from bumblebee.sim.effects import Effect
@@ -277,7 +278,7 @@ def _explained(before: np.ndarray, after: np.ndarray) -> float:
     return float(np.clip((power[0] - power[1]) / max(power[0] - 1.0, 1e-12), 0.0, 1.0))
 
 
-def find_packet_loss(run: SearchState) -> bool:
+def find_packet_loss(run: SearchState) -> Asking[bool]:
     """Look for packet loss; if some commands never arrived, go on with those that did.
 
     Not where a drive that follows its targets late or slowly explains more: such a one, too, is late here and there.
@@ -290,12 +291,7 @@ def find_packet_loss(run: SearchState) -> bool:
     gain = criterion(problem, fit) - criterion(run.problem, run.fit) - _told(problem.windows, loss.share)
     if explains_more(run, loss.where, gain):
         return False
-    run.loss, run.problem, run.holdout, run.fit = loss, problem, holdout, fit
-    run.say(f"found lost commands on {loss.where or 'the whole robot'}: {loss.share:.4f}")
-    run.closed.clear()
-    run.hopeless.clear()
-    run.renew(run.fit)
-    run.rescreen()
+    yield Lost(loss, problem, holdout, fit)
     return True
 
 

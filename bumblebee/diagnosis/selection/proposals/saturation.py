@@ -9,7 +9,7 @@ fit's robust cost, 2 s M log(1 + power / s) summed over windows with s their med
 `problem.window_weights` are the weights.
 """
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from bumblebee.diagnosis.candidates import SATURATIONS, Candidate
 from bumblebee.diagnosis.comparison import plausible
 from bumblebee.diagnosis.estimation import Fit, LeftOver
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.changes import Asking, Vain
 from bumblebee.diagnosis.selection.profile import halved, profile
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
@@ -86,22 +87,23 @@ def saturation_trials(
     fit: Fit,
     candidates: Sequence[Candidate],
     weights: np.ndarray,
-    hopeless: set[tuple[str, str]],
+    hopeless: Container[tuple[str, str]],
     changes: Changes | None = None,
-) -> list[Trial]:
+) -> Asking[list[Trial]]:
     """The limit that explains most of the windows with large residuals; none where no limit does.
 
     Of the four windows that a limit reaches first one must be off, and its joint in it, or it is not simulated. Where
     it acts in a few only it must bring them down to noise, which one number does not do by chance. One that only makes
-    the windows worse that it reaches first joins the `hopeless` (effect, place), which are not tried. `changes` are
-    what was simulated before.
+    the windows worse that it reaches first is then among the `hopeless` (effect, place), which are not tried. `changes`
+    are what was simulated before.
     """
     rule = problem.thresholds.selection.proposals.saturation
     clean = fit.clean(problem)
     power = (clean**2).mean(axis=1)
     usual = max(float(np.median(power)), 1.0)
     taken = {(c.effect, c.where) for c in fit.chosen}
-    kinds = [c for c in candidates if c.effect in SATURATIONS and (c.effect, c.where) not in taken | hopeless]
+    kinds = [c for c in candidates if c.effect in SATURATIONS and (c.effect, c.where) not in taken]
+    kinds = [c for c in kinds if (c.effect, c.where) not in hopeless]
     odd = power > rule.odd_power
     if not odd.any() or not kinds:
         return []
@@ -118,7 +120,7 @@ def saturation_trials(
             continue
         value, gain = best
         if gain <= 0:
-            hopeless.add((kind, where))
+            yield Vain(kind, where)
         if gain > rule.least_gain:
             found += _trial(problem, fit, weights, _nearest(own, value), value, reach)
     return sorted(found, key=lambda t: t.cost)[:1]

@@ -17,6 +17,7 @@ from bumblebee.diagnosis.candidates import Candidate, is_chosen, rough
 from bumblebee.diagnosis.comparison import columns_without, criterion, linear_cost
 from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.changes import Asking, Vain
 from bumblebee.diagnosis.selection.profile import profile, reachable, stepped
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares, odd_joints
 from bumblebee.diagnosis.selection.state import SearchState
@@ -31,7 +32,7 @@ Swapped = tuple[Fit, Trial]
 """A fit without some names, and what is tried in their place."""
 
 
-def setpoint_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[Swapped]:
+def setpoint_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[Swapped | Vain]:
     """Set-points in the place of what they pass for, for each place that has such a name among the `free` ones."""
     for where in dict.fromkeys(c.where for c in free if c.effect in TIMING):
         like = [c for c in free if c.where == where and c.effect in LIKE]
@@ -40,7 +41,7 @@ def setpoint_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[Swap
             key = (" ".join(sorted(c.effect for c in gone)), where)
             if key in run.hopeless:
                 continue
-            run.hopeless.add(key)
+            yield Vain(*key)
             rest = columns_without(run.problem, run.fit, gone)
             own = linear_cost(run.problem, rest, run.weights) - linear_cost(run.problem, run.fit, run.weights)
             kinds = {c.effect for c in gone if c.effect in SETPOINTS}
@@ -142,7 +143,7 @@ def _scaled(values: np.ndarray, size: float, speed: float = 1.0) -> np.ndarray:
     return values * np.array([size, speed])[: len(values)]
 
 
-def setpoint_trials(run: SearchState, tried: Sequence[Trial]) -> list[Trial]:
+def setpoint_trials(run: SearchState, tried: Sequence[Trial]) -> Asking[list[Trial]]:
     """Set-points that explain more than the best of the trials, where that leaves much and may stand for one.
 
     Each place is asked once, and again when something was found on it.
@@ -153,7 +154,7 @@ def setpoint_trials(run: SearchState, tried: Sequence[Trial]) -> list[Trial]:
     key = (SETPOINTS[0], best.candidate.where)
     if key in run.hopeless:
         return []
-    run.hopeless.add(key)
+    yield Vain(*key)
     found = setpoints_beside(run.problem, run.fit, run.candidates, run.weights, best.candidate.where)
     return [trial for trial in found if trial.cost < best.cost]
 

@@ -6,13 +6,14 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import SHAPED, Candidate, is_chosen
 from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.selection.changes import Asking, Offered, Taken
 from bumblebee.diagnosis.selection.moves import Terms, refitted
 from bumblebee.diagnosis.selection.proposals.rubbing_joints import worth_asking
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 
 
-def add_stribeck_friction(run: SearchState) -> bool:
+def add_stribeck_friction(run: SearchState) -> Asking[bool]:
     """Try Stribeck friction conditional on each dry friction that was found; whether one was accepted."""
     rule = run.problem.thresholds.selection.proposals.stribeck
     dry = [c for c in run.fit.chosen if c.effect == "coulomb_friction"]
@@ -29,11 +30,13 @@ def add_stribeck_friction(run: SearchState) -> bool:
             continue
         values = tried[k].start
         values[0] = tests.steps[k][0] * tried[k].step[0]
-        found |= bool(values[0] > 0) and run.accept(tried[k], values)
+        if values[0] > 0:
+            accepted = yield Offered(tried[k], values)
+            found |= accepted
     return found
 
 
-def add_dry_friction(run: SearchState) -> None:
+def add_dry_friction(run: SearchState) -> Asking[None]:
     """Fit dry friction together with its joint's friction by direction or speed, where that was found alone."""
     rule = run.problem.thresholds.selection.proposals.stribeck
     for c in [c for c in run.fit.chosen if c.effect in SHAPED]:
@@ -44,7 +47,7 @@ def add_dry_friction(run: SearchState) -> None:
         terms = Terms(rule.dry_z, (no_worse,), rule.iterations, run.weights, artefact=False)
         move = refitted(run.now, run.fit, dry, _on_level(run.fit, c, dry, rule.rest), terms)
         if move is not None and move.after.of(dry)[0] >= dry.nominal[0] and move.passes():
-            run.take(move, rivals=1)  # no further name but a parameter of the same
+            yield Taken(move, rivals=1)  # no further name but a parameter of the same
 
 
 def _on_level(fit: Fit, candidate: Candidate, dry: Candidate, rest: float) -> list[np.ndarray]:

@@ -21,6 +21,7 @@ from scipy.stats import chi2
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.estimation import LeftOver
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.changes import Asking, Vain
 from bumblebee.diagnosis.selection.moves import Terms, refitted
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
 from bumblebee.diagnosis.selection.screening import restless
@@ -33,7 +34,7 @@ from bumblebee.diagnosis.thresholds.proposals import TorqueRipple
 KIND = "cogging"
 
 
-def ripple_trials(run: SearchState, tried: Sequence[Trial] = ()) -> list[Trial]:
+def ripple_trials(run: SearchState, tried: Sequence[Trial] = ()) -> Asking[list[Trial]]:
     """The ripple that explains most on each of the joints that lack most torque; none where none is beyond chance.
 
     Each joint is asked once, and again when something was found on it. What is faint beside what was `tried` waits.
@@ -53,7 +54,7 @@ def ripple_trials(run: SearchState, tried: Sequence[Trial] = ()) -> list[Trial]:
         clear = [(candidate, steps) for candidate, steps, gain in peaks if gain >= faint]
         if peaks and not clear:
             continue
-        run.hopeless.add((KIND, like.where))
+        yield Vain(KIND, like.where)
         trials = [_tried(run, candidate, steps) for candidate, steps in clear]
         best = min((t for t in trials if t is not None), key=lambda t: t.cost, default=None)
         if best is not None and best.cost < run.fit.cost - run.bound**2 / 2:

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.comparison import Holdout, certainty, compare, evidence
+from bumblebee.diagnosis.comparison import Holdout, compare
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
-from bumblebee.diagnosis.residuals import Problem, make_problem, screening_windows, window_weights
+from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
+from bumblebee.diagnosis.selection.changes import Asked, Asking, Windows
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
@@ -41,7 +42,7 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     return replace(made, between=problem.between)
 
 
-def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
+def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]:
     """Begin anew with the usual effects of all joints, where some effects leave large residuals; whether it did.
 
     Only if the last of these explained little, or they are very large: else the next may explain the rest. Where the
@@ -55,20 +56,19 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
     if run.tried_many or run.given or power < run.config.many or (power < far if stuck else early):
         return False
     if run.power() < run.rule.whiten_anew * run.whitened_at:
-        _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
-        run.say(f"whitened again around the effects found: chi-square {run.power():.3g}")
+        yield Windows(*whitened_anew(run.problem, run.holdout, run.fit))
         if run.power() < run.config.many:
             return True
-    run.tried_many = True
+    yield Asked(far=False)
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
     rule = run.problem.thresholds.comparison.together
     if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
         return False
-    begin_with(run, fit)
+    yield begun_with(run, fit)
     return True
 
 
-def start_far_off(run: SearchState, tried: Sequence[Trial]) -> bool:
+def start_far_off(run: SearchState, tried: Sequence[Trial]) -> Asking[bool]:
     """Begin with the usual effects of all joints of a robot that is far from the data; whether it did.
 
     Only before anything is found, where they leave next to nothing, and where no effect that was `tried` by itself
@@ -78,7 +78,7 @@ def start_far_off(run: SearchState, tried: Sequence[Trial]) -> bool:
     small = is_small(run.problem)
     if run.asked_far or run.fit.chosen or declared < run.config.far or not (small or _is_worth_minutes(run, tried)):
         return False
-    run.asked_far = True
+    yield Asked(far=True)
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
     little = rule.next_to_nothing if small else rule.little_of_large
     if fit is None or fit.power(run.problem) >= max(rule.still_off, little * declared):
@@ -88,7 +88,7 @@ def start_far_off(run: SearchState, tried: Sequence[Trial]) -> bool:
         return False
     if not compare(run.problem, run.holdout, run.fit, fit).passes(run.problem.thresholds.comparison.together):
         return False
-    begin_with(run, fit)
+    yield begun_with(run, fit)
     return True
 
 
@@ -99,22 +99,6 @@ def _is_worth_minutes(run: SearchState, tried: Sequence[Trial]) -> bool:
     return all(t.cost > (place if t.candidate.where else whole) for t in tried)
 
 
-def begin_with(run: SearchState, fit: Fit) -> None:
-    """Begin anew with many effects at once, which are not fitted so again."""
-    _start_anew(run, *whitened_anew(run.problem, run.holdout, fit))
-    z = certainty(run.problem, run.fit, run.weights)
-    run.steps = [evidence(c, float(least), len(run.candidates)) for c, least in zip(run.fit.chosen, z, strict=True)]
-    run.say(f"restarting the search from {len(run.fit.chosen)} jointly fitted effects: chi-square {run.power():.3g}")
-    run.tried_many, run.given = True, len(run.fit.chosen)
-    run.patience = min(run.patience, run.rule.many_patience)
-
-
-def _start_anew(run: SearchState, problem: Problem, holdout: Holdout, fit: Fit) -> None:
-    """Go on from a fit to windows that were whitened around it; what was tried in vain before may be tried again."""
-    run.problem, run.holdout, run.fit = problem, holdout, fit
-    run.keep = screening_windows(problem, run.config.screen_windows)
-    run.weights = window_weights(fit.clean(problem))
-    run.whitened_at = run.power()
-    run.closed.clear()
-    run.hopeless.clear()
-    run.rescreen()
+def begun_with(run: SearchState, fit: Fit) -> Windows:
+    """A beginning anew with many effects at once."""
+    return Windows(*whitened_anew(run.problem, run.holdout, fit), begun=True)
