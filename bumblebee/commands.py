@@ -3,9 +3,11 @@
 Commands of the upper floors (`tasks`, `flows`) stand here as text alone: the library imports neither.
 """
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -57,6 +59,7 @@ TABLE: dict[str, tuple[Command, ...]] = {
     ),
 }
 COMMANDS = {command.name: command for commands in TABLE.values() for command in commands}
+CHECKOUT = "The loop is run from a clone: git clone, then `make setup` there (README, Install)."
 LOOP_PACKAGES = "In the checkout: pip install -e '.[loop,orchestration]'; `bumblebee doctor` lists what is missing."
 
 
@@ -95,10 +98,25 @@ def load(command: Command) -> Any:
         BadInput: a package that it needs is not installed.
     """
     module, _, name = command.target.partition(":")
+    if not module.startswith("bumblebee."):
+        _from_checkout(command.name)
     try:
         return getattr(import_module(module), name)
     except ModuleNotFoundError as error:
         raise missing(error, command.name) from None
+
+
+def _from_checkout(command: str) -> None:
+    """Let the upper floors, folders of a checkout, be imported from the one that the library lies in.
+
+    Raises:
+        BadInput: the library was installed by itself.
+    """
+    home = Path(__file__).parents[1]
+    if not (home / "flows").is_dir():
+        raise BadInput(f"bumblebee {command}", "BumbleBee's checkout", "the library alone", CHECKOUT)
+    if str(home) not in sys.path:
+        sys.path.append(str(home))
 
 
 def missing(error: ModuleNotFoundError, command: str) -> BadInput:
