@@ -215,10 +215,10 @@ def _print_table(rows: "list[Inspected]", path: Path) -> None:
 
 def _print_notes(notes: list[tuple[str, str]]) -> None:
     """Facts that were detected and not stated, in few lines: (place, note) of each motion."""
-    from bumblebee.motion.few_lines import few_lines
+    from bumblebee.motion.few_lines import said_of
 
-    for told in few_lines(notes):
-        print(_line(f"noted: {told.line}: {told.whose}"))
+    for line in said_of("noted", notes):
+        print(line)
 
 
 def _place(file: Path, path: Path) -> str:
@@ -236,10 +236,10 @@ def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
     from bumblebee.motion.convert import clips_at
 
     names: list[str] = []
-    reasons: list[str] = []
+    reasons: list[tuple[str, str]] = []
     clip = None
     said: list[tuple[str, str]] = []
-    for found, notes in clips_at(path, options, reasons.append):
+    for found, notes in clips_at(path, options, lambda *said: reasons.append(said)):
         names.append(found.name)
         if name in ("", found.name):
             clip, said = found, notes
@@ -251,7 +251,8 @@ def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
     some = ", ".join(names[:_NAMED]) + (" ..." if len(names) > _NAMED else "")
     if names:
         raise BadInput(path, "the name of one motion", repr(name) if name else "several motions", f"--motion: {some}")
-    raise BadInput(path, "a motion of the robot", f"none that can be used; the first: {' '.join(reasons[:1])}"[:1500])
+    first = ": ".join(reasons[0]) if reasons else ""
+    raise BadInput(path, "a motion of the robot", f"none that can be used; the first: {first}"[:1500])
 
 
 def _claim_picture(out: Path, path: Path) -> None:

@@ -40,7 +40,7 @@ def train(
     from bumblebee.api.training import train as fit
     from bumblebee.io.write import refuse_overlap
     from bumblebee.motion.cache import user_cache
-    from bumblebee.motion.few_lines import few_lines
+    from bumblebee.motion.few_lines import said_of
     from bumblebee.motion.folder import ReadConfig, read_folder
     from bumblebee.motion.one_file import stated
     from bumblebee.sim.quiet import quiet_mujoco
@@ -51,8 +51,8 @@ def train(
     refuse_overlap(out, [folder])
     files = ReadConfig(**vars(stated(settings or [], csv_fps=csv_fps)), max_seconds=_PIECE)
     reading = read_folder(folder, files, cache=user_cache())
-    for told in few_lines(zip(reading.skipped["file"], reading.skipped["reason"], strict=True)):
-        print(plain(f"skipped: {told.line}: {told.whose}"))
+    for line in reading.skipped_lines:
+        print(line)
     counts = f"{len(reading.clips)} motions of at most {_PIECE:g} s read, {len(reading.skipped)} files skipped"
     print(counts, flush=True)
 
@@ -60,8 +60,8 @@ def train(
         print(plain(text), flush=True)
 
     made = fit(reading.clips, out, overwrite=overwrite, say=say, **asdict(config))
-    for told in few_lines(zip(made.dropped["motion"], made.dropped["explanation"], strict=True)):
-        print(plain(f"dropped: {told.line}: {told.whose}"))
+    for line in said_of("dropped", zip(made.dropped["motion"], made.dropped["explanation"], strict=True)):
+        print(line)
     print("\n".join(line for line in tried(made.trials, splits(parent_of(config.start))) if line))
     print(f"written: {out}: policy.onnx, contract.json, README.md (the card), film.gif, policy.pt, trials.csv")
 
@@ -98,7 +98,7 @@ def evaluate(
         try_output(out)
     loaded, files = load_policy(policy), stated(settings or [], csv_fps=csv_fps)
     embedded = {} if limit is None else {"limit": limit}
-    clips = read_motions(motions, **(embedded if motions == EMBEDDED else vars(files)))
+    clips = read_motions(motions, say=print, **(embedded if motions == EMBEDDED else vars(files)))
     if not clips:
         raise BadInput(motions, "a motion", "none")
     table = run(loaded, clips[:limit], repeats=repeats, noise=noise, seed=seed, out=states)

@@ -105,8 +105,8 @@ def _found(
         title = "Measured, and simulated in pale blue" + (" (declared) and green (corrected)" if effects else "")
         return entries, title, spec_of(declared)
     if is_policy(path):
-        return policy_entries(path, motions, stated(settings)), f"{path.name}, live", None
-    return motion_entries(path, stated(settings)), f"Motions of {path.name}", None
+        return policy_entries(path, motions, stated(settings), print), f"{path.name}, live", None
+    return motion_entries(path, stated(settings), print), f"Motions of {path.name}", None
 
 
 def play_shipped_policy(port: int = PORT, meshes: Path | None = None, ticks: int | None = None) -> None:

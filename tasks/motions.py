@@ -10,7 +10,7 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
-from bumblebee.motion.few_lines import few_lines
+from bumblebee.motion.few_lines import said_of
 from bumblebee.motion.folder import ReadConfig, Reading, read_each, skipped_table
 from bumblebee.motion.pieces import held_out
 from bumblebee.motion.store import Library, LibraryWriter, read_index, write_library
@@ -126,9 +126,9 @@ def tell(index: pd.DataFrame, reading: Reading) -> None:
         print("motions with text: " + ", ".join(f"{name} {count}" for name, count in reading.texts.motions.items()))
         _print([f"text: {line}" for line in reading.texts.notes], "text: {} more lines like these")
     for what, table, column in (("skipped", reading.skipped, "reason"), ("noted", reading.notes, "note")):
-        told = few_lines(zip(table["file"], table[column], strict=True))
         file = paths.MOTIONS / ("skipped.csv" if what == "skipped" else NOTES)
-        _print([f"{what}: {one.line}: {one.whose}" for one in told], f"{what}: {{}} more kinds: {file}")
+        told = said_of(what, zip(table["file"], table[column], strict=True))
+        _print(told, f"{what}: {{}} more kinds: {file}")
 
 
 def _print(lines: list[str], more: str) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import bumblebee as bb
 from bumblebee import cli
 from bumblebee.motion.formats.write import write_motion
 from bumblebee.motion.kinematics import make_clip
@@ -63,6 +64,18 @@ def test_names_cannot_write_to_the_terminal(folder, capsys):
     assert run("inspect", folder, "--csv-fps", 50) == 0
     said = capsys.readouterr().out
     assert "\x1b" not in said and "[bold]" in said
+
+
+def test_read_motions_evaluate_and_view_say_in_the_same_line_what_is_skipped_and_why(folder, tmp_path, capsys):
+    with pytest.warns(UserWarning, match="skipped: expected a whole pickle.*: bad.pkl") as heard:
+        bb.read_motions(folder, csv_fps=50)
+    line = str(heard[0].message)
+    assert heard[0].filename == __file__
+    assert cli.run(["evaluate", "shipped", str(folder), "--csv-fps", "50", "--limit", "1"]) == 0
+    assert line in capsys.readouterr().out.splitlines()
+    page = tmp_path / "replay.html"
+    assert cli.run(["view", str(folder), "--set", "csv_fps=50", "--out", str(page), "--seconds", "0.2"]) == 0
+    assert line in capsys.readouterr().out.splitlines()
 
 
 def test_convert_writes_and_says_the_rates(folder, tmp_path, capsys):

@@ -1,5 +1,6 @@
 """Read motions, make one from arrays, put a person's motion on the G1, draw a motion."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -15,13 +16,20 @@ from bumblebee.robot.facts import joint_names
 EMBEDDED = "embedded"
 
 
-def read_motions(path: str | Path = EMBEDDED, *, max_seconds: float = 0.0, **settings: Any) -> list[Clip]:
+def _warn(line: str) -> None:
+    warnings.warn(line, stacklevel=3)
+
+
+def read_motions(
+    path: str | Path = EMBEDDED, *, max_seconds: float = 0.0, say: Callable[[str], None] = _warn, **settings: Any
+) -> list[Clip]:
     """Read all motions at a path as motions of the G1 at 50 Hz; people's are retargeted, once for each file.
 
     Args:
         path: a file, a folder or an archive in any format that docs/data.md lists, a motion library, or
             `"embedded"` for the 59 motions that come along.
         max_seconds: cut longer motions into equal pieces of at most this length [s]; 0 cuts none.
+        say: called with a line for files that are skipped; by default the line becomes a Python warning.
         **settings: what files leave unsaid, by the fields of `bumblebee.motion.settings.ReadConfig`, such as
             `csv_fps=60`; for the embedded motions the fields of `bumblebee.motion.embedded.EmbeddedConfig`.
 
@@ -46,7 +54,10 @@ def read_motions(path: str | Path = EMBEDDED, *, max_seconds: float = 0.0, **set
     if str(path) == EMBEDDED:
         return make_library(_settings(EmbeddedConfig, settings))
     config = _settings(ReadConfig, {"max_seconds": max_seconds, **settings})
-    return read_folder(Path(path).expanduser(), config, cache=user_cache()).clips
+    reading = read_folder(Path(path).expanduser(), config, cache=user_cache())
+    for line in reading.skipped_lines:
+        say(line)
+    return reading.clips
 
 
 def _settings(kind: Callable[..., Any], given: Mapping[str, Any]) -> Any:

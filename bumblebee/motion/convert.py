@@ -86,7 +86,7 @@ def convert(
     """
     claim(out, path, config.to, overwrite)
     done = Converted()
-    clips = _clips(path, config, done, tell or (lambda line: None))
+    clips = _clips(path, config, done, lambda place, reason: tell(f"{place}: {reason}") if tell else None)
     first = next(clips, None)
     if first is None:
         came = f"{done.files:,} files with none that is usable; the first: {': '.join(done.skipped[0])}"
@@ -149,11 +149,11 @@ def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> tuple[Clip, 
 
 
 def clips_at(
-    path: Path, files: FileConfig, tell: Callable[[str], None], fps: float | None = None
+    path: Path, files: FileConfig, tell: Callable[[str, str], None], fps: float | None = None
 ) -> Iterator[tuple[Clip, list[tuple[str, str]]]]:
     """The motions at `path` as clips at `fps` [Hz], or their own rates, under distinct names, with notes (place, note).
 
-    `tell` gets a line for what gives none.
+    `tell` gets place and reason of what gives none.
     """
     done = Converted()
     for clip in _clips(path, ConvertConfig("asap", fps, files), done, tell):
@@ -161,13 +161,13 @@ def clips_at(
         done.notes = []
 
 
-def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[str], None]) -> Iterator[Clip]:
+def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[str, str], None]) -> Iterator[Clip]:
     """The motions that can be written, one after the other, under distinct names; `done` gets what is said of them."""
     names = Names()
 
     def skip(place: str, reason: str) -> None:
         done.skipped.append((place, reason))
-        tell(f"{place}: {reason}")
+        tell(place, reason)
 
     for found in find_motions(path, config.files):
         done.files += 1

@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from bumblebee.errors import plain
+
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?!\.?\w)")
 
 
@@ -32,6 +34,11 @@ def few_lines(said: Iterable[tuple[str, str]]) -> list[Told]:
     told = [Told(_joined(words, [numbers for _, numbers in group]), tuple(dict.fromkeys(file for file, _ in group)))
             for words, group in kinds.items()]  # fmt: skip
     return sorted(told, key=lambda one: -len(one.files))
+
+
+def said_of(word: str, said: Iterable[tuple[str, str]]) -> list[str]:
+    """The lines after a word such as `skipped`, each with its file or how many there are; `said` as above."""
+    return [plain(f"{word}: {told.line.removesuffix('.')}: {told.whose}") for told in few_lines(said)]
 
 
 def _joined(words: tuple[str, ...], numbers: list[list[str]]) -> str:

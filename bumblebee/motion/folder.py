@@ -17,6 +17,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.accounting import Account, account
 from bumblebee.motion.describe.described import Described
 from bumblebee.motion.describe.describer import Describer, describer
+from bumblebee.motion.few_lines import said_of
 from bumblebee.motion.files import File, each_file, tried
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licence_table import stated_of
@@ -41,6 +42,11 @@ class Reading:
     """Columns `file`, `note`."""
     texts: Account | None = None
     """Where the captions come from, in counts that add up."""
+
+    @property
+    def skipped_lines(self) -> list[str]:
+        """Few lines that say which files were skipped and why."""
+        return said_of("skipped", zip(self.skipped["file"], self.skipped["reason"], strict=True))
 
 
 def read_folder(

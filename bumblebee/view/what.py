@@ -10,6 +10,7 @@ from bumblebee.errors import BadInput
 from bumblebee.learning.trial_folder import ENDS, FOLLOWED, KeptRollout, is_kept, read_kept
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.convert import clips_at
+from bumblebee.motion.few_lines import said_of
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.report.replay import Drawn, side_by_side
 from bumblebee.robot.facts import joint_names
@@ -55,16 +56,16 @@ def _kept(kept: KeptRollout) -> Recorded:
     return Recorded(states, kept.fps, (Drawn("robot"), REFERENCE), note, curves, ("robot", "reference"))
 
 
-def motion_entries(path: Path, files: FileConfig) -> list[Entry]:
-    """The motions of a file or folder, as they are.
+def motion_entries(path: Path, files: FileConfig, say: Callable[[str], None]) -> list[Entry]:
+    """The motions of a file or folder, as they are; `say` gets the lines about files that are skipped.
 
     Raises:
         BadInput: none can be used.
     """
-    return [_of(clip, partial(of_clip, clip, joint_names())) for clip in _clips(path, files)]
+    return [_of(clip, partial(of_clip, clip, joint_names())) for clip in _clips(path, files, say)]
 
 
-def policy_entries(path: Path, motions: Path | None, files: FileConfig) -> list[Entry]:
+def policy_entries(path: Path, motions: Path | None, files: FileConfig, say: Callable[[str], None]) -> list[Entry]:
     """A policy live on a file or folder of motions; without one, on the embedded motions.
 
     Raises:
@@ -73,18 +74,20 @@ def policy_entries(path: Path, motions: Path | None, files: FileConfig) -> list[
     policy = ExportedPolicy.load(path)
     if motions is None:
         return embedded_entries(policy)
-    return [_of(clip, partial(LivePolicy, policy, clip)) for clip in _clips(motions, files, CONTROL_HZ)]
+    return [_of(clip, partial(LivePolicy, policy, clip)) for clip in _clips(motions, files, say, CONTROL_HZ)]
 
 
 def _of(clip: Clip, make: Callable[[], Source]) -> Entry:
     return Entry(clip.name, clip.family, clip.captions[0].split("#")[0] if clip.captions else "", make)
 
 
-def _clips(path: Path, files: FileConfig, fps: float | None = None) -> list[Clip]:
-    reasons: list[str] = []
-    clips = [clip for clip, _ in clips_at(path, files, reasons.append, fps)]
+def _clips(path: Path, files: FileConfig, say: Callable[[str], None], fps: float | None = None) -> list[Clip]:
+    skipped: list[tuple[str, str]] = []
+    clips = [clip for clip, _ in clips_at(path, files, lambda *said: skipped.append(said), fps)]
     if not clips:
-        came = f"none that can be used; the first: {reasons[0]}" if reasons else "none"
+        came = f"none that can be used; the first: {': '.join(skipped[0])}" if skipped else "none"
         remedy = f"`bumblebee motions inspect {path}` lists each file with its reason."
         raise BadInput(path, "a motion of the robot", came[:1500], remedy)
+    for line in said_of("skipped", skipped):
+        say(line)
     return clips

@@ -1,6 +1,6 @@
 """Notes that differ in numbers only are one line; words and names with digits are no numbers."""
 
-from bumblebee.motion.few_lines import few_lines
+from bumblebee.motion.few_lines import few_lines, said_of
 
 
 def lines(*said: str) -> list[tuple[str, str]]:
@@ -21,3 +21,7 @@ def test_a_number_at_the_end_of_a_sentence_is_one_and_digits_in_a_name_are_none(
 def test_what_concerns_most_files_comes_first_and_a_file_counts_once():
     said = few_lines([("a", "x 1"), ("b", "y 1"), ("b", "y 3"), ("c", "y 2")])
     assert [(one.line, one.files) for one in said] == [("y 1 to 3", ("b", "c")), ("x 1", ("a",))]
+
+
+def test_a_line_with_its_file_has_no_full_stop_before_it():
+    assert said_of("noted", [("a.bvh", "no floor. Move it.")]) == ["noted: no floor. Move it: a.bvh"]
