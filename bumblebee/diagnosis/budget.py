@@ -8,6 +8,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+EARLY = "early, by `--minutes` or a signal"
+"""Words of a note on a search that the user's time or signal ended."""
+
 
 @dataclass(eq=False)
 class Budget:
@@ -45,5 +48,5 @@ class Budget:
         if not self.left_out:
             return []
         limit = f"at its limit of {self.seconds:.0f} s of processor time (`{self.setting}`)"
-        why = "early, by `--minutes` or a signal" if self.early else limit
+        why = EARLY if self.early else limit
         return [f"the search {self.search} ended {why}; not tried: " + "; ".join(self.left_out)]

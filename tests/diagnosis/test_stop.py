@@ -3,10 +3,12 @@
 import os
 import signal
 import time
+from html import unescape
 
 import pytest
 
 from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.diagnosis.report import render_report, summary
 from bumblebee.diagnosis.simulation import OutOfTime, Stop, ending
 from bumblebee.diagnosis.simulation.stop import check
 from bumblebee.first_signal import first_signal
@@ -39,6 +41,9 @@ def test_what_was_found_before_the_signal_is_fitted_and_reported():
     assert low < 0.7 < high and ("coulomb_friction", "j1") in found
     ended = [note for note in told["notes"] if "ended early, by `--minutes` or a signal" in note]
     assert len(ended) == 2 and "the step that was going on" in ended[0]
+    assert summary(told).startswith(f"WARNING: {ended[0]}\nWARNING: {ended[1]}\n")
+    page = unescape(render_report(told, []))
+    assert all(page.count(note) == 1 and page.index(note) < page.index("class='lead first'") for note in ended)
 
 
 def test_time_that_is_over_at_once_leaves_the_declared_model_and_its_error():

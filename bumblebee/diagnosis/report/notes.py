@@ -24,6 +24,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bumblebee.diagnosis.budget import EARLY
 from bumblebee.diagnosis.dataset import Session, window_errors
 from bumblebee.diagnosis.report.gain_by_horizon import worse_rows
 from bumblebee.diagnosis.report.html import number
@@ -41,6 +42,11 @@ ALONE = (
     "a single rollout: what the model lacks in its first two thirds was looked for in the rest; whether another run "
     "lacks the same could not be tested. Record another run"
 )
+
+
+def early_first(notes: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Notes on searches that the user's time or signal ended, which are read before all else, and the others."""
+    return [note for note in notes if EARLY in note], [note for note in notes if EARLY not in note]
 
 
 def latency_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str], rule: Verdicts | None = None) -> list[str]:

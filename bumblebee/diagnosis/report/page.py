@@ -20,7 +20,7 @@ from bumblebee.diagnosis.report.html import (
 )
 from bumblebee.diagnosis.report.left_out import lost_without, shares_words
 from bumblebee.diagnosis.report.left_table import what_is_left_table
-from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left, worse_horizons
+from bumblebee.diagnosis.report.notes import early_first, unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
 from bumblebee.diagnosis.simulation import named, of_joint
 from bumblebee.diagnosis.thresholds.report import Listing, ReportThresholds, Verdicts
@@ -37,6 +37,7 @@ def render_report(
     bad = worse_horizons(document["error"], rules.verdicts)
     parts = [
         "<h1>What the model lacks</h1>",
+        *map(warning, early_first(document.get("notes", []))[0]),
         *_opening(document, rules),
         *[warning(text) for text in [*document.get("warnings", []), *bad]],
         *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
@@ -235,7 +236,7 @@ def _small(entries: Sequence[dict[str, Any]], most: int) -> str:
 
 
 def _notes(document: dict[str, Any]) -> list[str]:
-    notes = [_parts(document), *document.get("notes", [])]
+    notes = [_parts(document), *early_first(document.get("notes", []))[1]]
     return notes + [f"{', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import short_term
 from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
 from bumblebee.diagnosis.report.left_out import lost_without, shares_words
-from bumblebee.diagnosis.report.notes import nothing_seen, what_is_left, worse_horizons
+from bumblebee.diagnosis.report.notes import early_first, nothing_seen, what_is_left, worse_horizons
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, rows
 from bumblebee.diagnosis.thresholds.report import Listing, ReportThresholds, Verdicts
 
@@ -18,9 +18,10 @@ _COLUMNS = {"before": "declared", "after": "corrected", "oracle": "true", "floor
 
 
 def summary(document: dict[str, Any], rules: ReportThresholds | None = None) -> str:
-    """Effects with intervals, error before, after and floor, what is left."""
+    """What ended early and other warnings, effects with intervals, error before, after and floor, what is left."""
     rules = rules or ReportThresholds()
-    lines = [f"WARNING: {text}" for text in document.get("warnings", [])]
+    early, notes = early_first(document.get("notes", []))
+    lines = [f"WARNING: {text}" for text in [*early, *document.get("warnings", [])]]
     lines += [*headline(document, rules), "", *_grouped(document, rules)]
     columns = {k: document["error"][k] for k in _COLUMNS if k in document["error"]}
     where = "held-out rollouts" if document["holdout"] else "the fitted rollout"
@@ -28,7 +29,7 @@ def summary(document: dict[str, Any], rules: ReportThresholds | None = None) -> 
     lines += [*worse_horizons(document["error"], rules.verdicts), ""]
     left = document["unexplained"]
     lines.append(f"unexplained: {what_is_left(document, rules.verdicts)} (p = {left['p']:.2g})")
-    lines += [f"note: {note}" for note in document.get("notes", [])]
+    lines += [f"note: {note}" for note in notes]
     lines += [f"unidentifiable: {', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
     return "\n".join(lines)
 
