@@ -36,7 +36,7 @@ def train(
     from dataclasses import asdict
 
     from bumblebee.api.policy_card import splits, tried
-    from bumblebee.api.training import TrainConfig, parent_of
+    from bumblebee.api.training import TrainConfig, parent_of, require_ready
     from bumblebee.api.training import train as fit
     from bumblebee.io.write import refuse_overlap
     from bumblebee.motion.cache import user_cache
@@ -49,6 +49,7 @@ def train(
     chosen = {"minutes": minutes, "gpu": gpu, "start": start, "learner": learner, "held_out": held_out}
     config = TrainConfig(**chosen, worlds=worlds, threads=threads, seed=seed)  # type: ignore[arg-type]
     refuse_overlap(out, [folder])
+    require_ready(config, out, overwrite)
     files = ReadConfig(**vars(stated(settings or [], csv_fps=csv_fps)), max_seconds=_PIECE)
     reading = read_folder(folder, files, cache=user_cache())
     for line in reading.skipped_lines:

@@ -100,8 +100,7 @@ def train(
     from bumblebee.motion.pieces import hold_out
 
     config, out = _config(settings), Path(out).expanduser()
-    refuse_foreign(out, lambda path: overwrite and (path / CARD).exists(), "with --overwrite a policy")
-    try_output(out)
+    require_ready(config, out, overwrite)
     known, clips = learnt_before(config.start), checks.motions(motions)
     kept, dropped = filter_clips(clips)
     if not kept:
@@ -116,6 +115,19 @@ def train(
         train_for(learner, 60 * config.minutes)
         say(f"trained on {learner.frames:,} control steps; trying the policy on each motion")
         return _kept(learner, split, config, out, dropped, known, say)
+
+
+def require_ready(config: TrainConfig, out: Path, overwrite: bool) -> None:
+    """`BadInput` for what would end a training later: a place that is taken or cannot be written, a GPU's absence."""
+    refuse_foreign(out, lambda path: (path / CARD).exists(), "a policy")
+    if (out / CARD).exists() and not overwrite:
+        do = "--overwrite (in Python `overwrite=True`) replaces it."
+        raise BadInput(out, "a new folder", "a policy whose training is finished", do)
+    try_output(out)
+    if config.gpu:
+        from bumblebee.sim.warp_limits import warp_modules
+
+        warp_modules("cuda")
 
 
 def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "Learner":

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 import bumblebee as bb
+from bumblebee import cli
 from bumblebee.api import training
 from bumblebee.api.policy_card import learnt_before, splits, tried
 from bumblebee.api.recipes import as_seen_by
@@ -132,6 +133,22 @@ def test_an_evaluation_says_how_much_noise_there_was():
 def test_ppo_from_a_policy_without_a_critic_is_one_line_that_names_the_other_learner():
     with pytest.raises(bb.BadInput, match="world_model"):
         bb.train(STAND, "policy", minutes=0.005, worlds=8, start="imu")
+
+
+def test_a_training_that_cannot_be_is_refused_before_motions_are_read(monkeypatch):
+    monkeypatch.setattr("bumblebee.motion.folder.read_folder", lambda *rest, **more: pytest.fail("read"))
+    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
+    Path("motions").mkdir()
+    with pytest.raises(bb.BadInput, match=r"engine mujoco_warp: expected (the packages|an NVIDIA GPU)"):
+        cli.run(["train", "motions", "--gpu"])
+    for taken, said in (("policy", "came something else"), ("policy/card.json", "training is finished. --overwrite")):
+        Path(taken).mkdir()
+        with pytest.raises(bb.BadInput, match=said):
+            cli.run(["train", "motions"])
+        with pytest.raises(bb.BadInput, match=said):
+            bb.train(STAND, "policy")
+    with pytest.raises(pytest.fail.Exception, match="read"):
+        cli.run(["train", "motions", "--overwrite"])
 
 
 def test_a_training_that_was_killed_goes_on(monkeypatch):
