@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 LINE_EVERY = 10.0  # [s] between two plain lines
+SECONDS = "s"
+"""The unit of work that ends after a given time."""
 
 
 def clock(seconds: float) -> str:
@@ -20,8 +22,13 @@ def line(what: str, done: float, total: float, elapsed: float, unit: str, note: 
     rate = done / elapsed if elapsed > 0 else 0.0
     left = clock((total - done) / rate) if rate > 0 else "?"
     share = 100.0 * done / total if total else 100.0
-    text = f"{what}: {done:,.0f}/{total:,.0f} {unit} ({share:.0f} %), {rate:,.1f} {unit}/s, {left} left"
-    return f"{text}, {note}" if note else text
+    parts = [f"{what}: {done:,.0f}/{total:,.0f} {unit} ({share:.0f} %)", pace(rate, unit), f"{left} left", note]
+    return ", ".join(part for part in parts if part)
+
+
+def pace(rate: float, unit: str) -> str:
+    """How fast; nothing where the work is counted in seconds."""
+    return "" if unit == SECONDS else f"{rate:,.1f} {unit}/s"
 
 
 class Progress:
@@ -55,7 +62,8 @@ class Progress:
         elapsed = time.monotonic() - self._began
         fresh = self.done - self.start
         rate = fresh / elapsed if elapsed > 0 else 0.0
-        self._show(f"{self.what}: {fresh:,.0f} {self.unit} in {clock(elapsed)} ({rate:,.1f} {self.unit}/s)")
+        fast = pace(rate, self.unit)
+        self._show(f"{self.what}: {fresh:,.0f} {self.unit} in {clock(elapsed)}{fast and f' ({fast})'}")
 
 
 class _Bar(Progress):
@@ -74,7 +82,7 @@ class _Bar(Progress):
     def update(self, n: float = 1, note: str = "") -> None:
         self.done += n
         elapsed = max(time.monotonic() - self._began, 1e-9)
-        extra = f"{(self.done - self.start) / elapsed:,.1f} {self.unit}/s {note}"
+        extra = f"{pace((self.done - self.start) / elapsed, self.unit)} {note}"
         self._bar.update(self._task, total=self.total, completed=int(self.done), extra=extra)
 
     def close(self) -> None:
@@ -89,7 +97,7 @@ def progress(total: float, what: str, unit: str = "steps", start: float = 0.0) -
     Args:
         total: units of work in all, those of an earlier run included.
         what: a few words that name the work.
-        unit: the plural of one unit ("steps", "clips", "windows").
+        unit: the plural of one unit ("steps", "clips", "windows"), or `SECONDS`.
         start: units that an earlier, interrupted run had already done.
 
     Yields:

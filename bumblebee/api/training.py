@@ -163,9 +163,10 @@ def parent_of(start: str) -> Path | None:
 def train_for(learner: "Learner", seconds: float) -> None:
     """Train until `seconds` of training are done in all, those before a kill included; the curriculum follows the time.
 
-    The first iterations measure the speed, so that the progress bar's total is right from the start.
+    The first iterations measure the speed, from which the length of the schedules follows.
     """
     begin, marks = learner.iteration, []
+    learner.limit = seconds
 
     def aim(since: tuple[int, float]) -> None:
         each = (learner._seconds - since[1]) / (learner.iteration - since[0])

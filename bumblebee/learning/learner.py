@@ -21,7 +21,7 @@ from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.gpu_memory import Needs, told
 from bumblebee.learning.policy import Policy, Shape, load_policy, shape_of
 from bumblebee.learning.ranks import Ranks
-from bumblebee.progress import progress
+from bumblebee.progress import SECONDS, pace, progress
 from bumblebee.robot.facts import ROBOT
 from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
@@ -46,6 +46,8 @@ class Learner(ABC):
     def __init__(self, env: TrackingEnv, config: Any, folder: Path, ranks: Ranks | None) -> None:
         self.env, self.config, self.folder, self.ranks = env, config, Path(folder), ranks or Ranks()
         self.iteration, self._seconds = 0, 0.0
+        self.limit: float | None = None
+        """Time of the whole training [s], where that ends it."""
 
     @property
     @abstractmethod
@@ -150,15 +152,22 @@ class Learner(ABC):
             yield lambda row, frames: None
             return
         curve = CurveWriter(self.folder / CURVE, self.iteration)
-        with progress(self.frames + self._coming(), f"train {what}", "frames", start=self.frames) as bar:
+        work = (self.frames + self._coming(), "frames", self.frames)
+        total, unit, start = work if self.limit is None else (self.limit, SECONDS, self._seconds)
+        with progress(total, f"train {what}", unit, start) as bar:
 
             def tell(row: dict[str, float], frames: int) -> None:
                 for name, value in row.items():
                     curve.add_scalar(name, value, self.iteration)
                 curve.flush()
-                bar.total = self.frames + self._coming()  # a training for so long learns how many iterations these are
                 known = f"success {row['success']:.2f}, " if math.isfinite(row["success"]) else ""
-                bar.update(frames, f"{known}key error {row['key_error']:.3f} m")
+                note = f"{known}key error {row['key_error']:.3f} m"
+                if self.limit is None:
+                    bar.total = self.frames + self._coming()  # `enough` may have set other iterations
+                    bar.update(frames, note)
+                else:
+                    took = row["seconds"] - bar.done
+                    bar.update(took, f"{pace(frames / took, 'frames')}, {note}")
 
             yield tell
         curve.stop()

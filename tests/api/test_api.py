@@ -163,6 +163,13 @@ def test_a_training_that_was_killed_goes_on(monkeypatch):
     assert iterations[0] >= 1 and not Path(".policy.training").exists()
 
 
+def test_the_time_left_of_a_training_follows_from_its_minutes(monkeypatch, capsys):
+    monkeypatch.setattr("bumblebee.progress.LINE_EVERY", 0.0)
+    bb.train(STAND, "policy", minutes=0.05, worlds=8)
+    told = capsys.readouterr().out
+    assert re.search(r"^train speed: \d+/3 s \(\d+ %\), 0:0\d left, [\d.,]+ frames/s, key error", told, re.M)
+
+
 @dataclass(frozen=True)
 class Ends:
     iterations: int = 0
