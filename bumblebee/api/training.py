@@ -13,6 +13,7 @@ from bumblebee.api import checks
 from bumblebee.deploy.card_text import CARD, NOTHING
 from bumblebee.errors import BadInput
 from bumblebee.io.write import new_folder, refuse_foreign, try_output
+from bumblebee.last_line import Stopped
 from bumblebee.motion.clip import Clip
 from bumblebee.ranges import Few, Name, PartOf, Range, Ranged, Seed
 
@@ -110,7 +111,7 @@ def train(
     split = hold_out(kept, config.held_out)
     held = sum(clip.split == "test" for clip in split)
     say(f"{len(split)} motions, {held} of them held out; {len(clips) - len(kept)} dropped by the filter")
-    with _checkpoints(out, split, config) as folder:
+    with _checkpoints(out, split, config, say) as folder:
         learner = make_learner(split, config, folder)
         train_for(learner, 60 * config.minutes)
         say(f"trained on {learner.frames:,} control steps; trying the policy on each motion")
@@ -193,8 +194,10 @@ def train_for(learner: "Learner", seconds: float) -> None:
 
 
 @contextlib.contextmanager
-def _checkpoints(out: Path, clips: Sequence[Clip], config: TrainConfig) -> Iterator[Path]:
+def _checkpoints(out: Path, clips: Sequence[Clip], config: TrainConfig, say: Callable[[str], None]) -> Iterator[Path]:
     """A folder beside `out` that survives a kill and is emptied when motions or settings change; gone at the end."""
+    from bumblebee.learning.learner import CHECKPOINT
+
     made_of = hashlib.sha256(repr(replace(config, minutes=1.0)).encode())
     for clip in clips:
         made_of.update(repr((clip.name, clip.split, clip.joint_pos.shape)).encode())
@@ -205,7 +208,12 @@ def _checkpoints(out: Path, clips: Sequence[Clip], config: TrainConfig) -> Itera
         if old.name != key:
             shutil.rmtree(old, ignore_errors=True)
     (place / key).mkdir(parents=True, exist_ok=True)
-    yield place / key
+    try:
+        yield place / key
+    except (KeyboardInterrupt, Stopped):
+        kept = f"the last checkpoint is kept in {place}; the same command goes on from it"
+        say(kept if (place / key / CHECKPOINT).exists() else "no checkpoint yet; the same command begins anew")
+        raise
     shutil.rmtree(place)
 
 

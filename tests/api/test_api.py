@@ -151,11 +151,22 @@ def test_a_training_that_cannot_be_is_refused_before_motions_are_read(monkeypatc
         cli.run(["train", "motions", "--overwrite"])
 
 
+def test_a_training_that_is_stopped_before_its_first_checkpoint_says_so(monkeypatch):
+    told: list[str] = []
+    monkeypatch.setattr(training, "train_for", lambda *rest: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        bb.train(STAND, "policy", minutes=0.005, worlds=8, say=told.append)
+    assert told[-1] == "no checkpoint yet; the same command begins anew"
+
+
 def test_a_training_that_was_killed_goes_on(monkeypatch):
     """Stopped after its training, the same call neither trains again nor starts over."""
     monkeypatch.setattr(training, "_kept", lambda *rest: (_ for _ in ()).throw(KeyboardInterrupt))
+    told: list[str] = []
     with pytest.raises(KeyboardInterrupt):
-        bb.train(STAND, "policy", minutes=0.005, worlds=8)
+        bb.train(STAND, "policy", minutes=0.005, worlds=8, say=told.append)
+    place = Path(".policy.training").absolute()
+    assert told[-1] == f"the last checkpoint is kept in {place}; the same command goes on from it"
     iterations = []
     monkeypatch.setattr(training, "_kept", lambda learner, *rest: iterations.append(learner.iteration))
     monkeypatch.setattr("bumblebee.learning.ppo.Trainer._iterate", lambda self: pytest.fail("trained again"))
