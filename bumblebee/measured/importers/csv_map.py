@@ -40,9 +40,8 @@ def read_table(source: Source, name: str, rollout_id: str, maps: Sequence[Column
     table = _table(source, name, maps)
     chosen = next((one for one in maps if not _missing(one, table)), None)
     if chosen is None:
-        came = ", ".join(map(str, table.columns[:40])) or "none"
-        do = "The header must be the first line." if where.lower().endswith(".csv") else ""
-        raise BadInput(where, f"the columns {', '.join(_missing(maps[0], table))}", f"only {came}", do)
+        came, missing = ", ".join(map(str, table.columns[:40])) or "none", _missing(maps[0], table)
+        raise BadInput(where, f"the columns {', '.join(missing)}", f"only {came}", _remedy(where, missing, maps[0]))
     table = table[table[_wanted(chosen)].notna().any(axis=1)]  # rows of nothing but separators
     if chosen.valid:
         table = table[table[chosen.valid].fillna(0).astype(bool)]
@@ -55,6 +54,17 @@ def read_table(source: Source, name: str, rollout_id: str, maps: Sequence[Column
         for key, rows in _episodes(f"{where}: column {chosen.episode}", table[chosen.episode], source.limits.members)
         for rollout in _rollouts(f"{where}: episode {key}"[:200], table.iloc[rows], f"{rollout_id}_{key}", chosen)
     ]
+
+
+def _remedy(where: str, missing: Sequence[str], one: ColumnMap) -> str:
+    """How a file comes to have the columns of a map, or out of the way."""
+    if set(missing) <= set(one.time):
+        return "Name the column of the time stamps in the map, beside `columns`: `time: NAME`."
+    if len(missing) < len(_wanted(one)):
+        return "Name the columns in the map as the header does."
+    if Path(where).stem == "conditions" and Path(where).is_file():
+        return f"A table of conditions is an option: --conditions {where}"
+    return "The header must be the first line; a file that is no log must be taken out of what is imported."
 
 
 def _episodes(where: str, cells: pd.Series, most: int) -> list[tuple[str, np.ndarray]]:

@@ -225,7 +225,8 @@ def _columns(where: str, table: Any, kind: str) -> dict[str, tuple[str, ...]]:
         raise BadInput(where, "columns of the contract and names in the file", repr(table)[:60])
     wrong = [name for name in table if name not in NAMED]
     if wrong:
-        raise BadInput(where, f"columns of the contract ({', '.join(NAMED)})", repr(wrong[0])[:60])
+        do = f"It is a key beside `columns`: `{wrong[0]}: ...`." if wrong[0] in ColumnMap.__dataclass_fields__ else ""
+        raise BadInput(where, f"columns of the contract ({', '.join(NAMED)})", repr(wrong[0])[:60], do)
     if "joint_pos" not in table:
         raise BadInput(where, "joint_pos", f"only {', '.join(table) or 'nothing'}")
     columns = {column: _names(f"{where}: {column}", names) for column, names in table.items()}

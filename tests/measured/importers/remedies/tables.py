@@ -51,6 +51,18 @@ def removed(attempt: Import, line: str) -> None:
     Path(line.split(": ", 1)[0]).unlink()
 
 
+def beside_conditions(attempt: Import) -> None:
+    csv_import(attempt)
+    (attempt.logs / "conditions.csv").write_text("log,supply_voltage\nlog.csv,24\n")
+
+
+def given_as_said(attempt: Import, line: str) -> None:
+    """Give the option that the line ends with."""
+    option, path = line.split()[-2:]
+    attempt.options.add(option)
+    attempt.conditions = Path(path).read_text()
+
+
 def without_line(attempt: Import, line: str) -> None:
     lines = log(attempt).read_text().splitlines()
     del lines[int(re.search(r"line (\d+)", line)[1]) - 1]
@@ -164,6 +176,30 @@ CASES = (
         edited(lambda t: f"my,log,of,3,May\n{t}"),
         "header must be the first line",
         rewritten(lambda t: t.split("\n", 1)[1]),
+    ),
+    Case(
+        "stamps under another name",
+        timed(lambda t: t.rename(columns={"time": "stamp"})),
+        "Name the column of the time stamps in the map, beside `columns`: `time: NAME`",
+        lambda a, line: a.map.update(time="stamp"),
+    ),
+    Case(
+        "stamps under columns",
+        with_columns(columns={"time": "time"}),
+        "'time'. It is a key beside `columns`: `time:",
+        lambda a, line: a.map.update(time=a.map["columns"].pop("time")),
+    ),
+    Case(
+        "another joint's column",
+        with_columns(columns={"joint_vel": ["hip_v", "knee_v"]}),
+        "Name the columns in the map as the header does",
+        lambda a, line: a.map["columns"].pop("joint_vel"),
+    ),
+    Case(
+        "a table of conditions beside the logs",
+        beside_conditions,
+        r"A table of conditions is an option: --conditions \S+/conditions\.csv$",
+        given_as_said,
     ),
     Case(
         "a column twice",
