@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bumblebee.cli_files import CsvFps, Settings
 from bumblebee.errors import BadInput
 
 if TYPE_CHECKING:
@@ -21,11 +22,6 @@ _NAMED = 8  # motions in a line that asks for one of them
 _PROGRESS_EVERY = 10.0  # s between lines that say how far a batch is
 
 Where = Annotated[Path, typer.Argument(metavar="PATH", help="A motion file, a folder, or a motion library.")]
-CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md."),
-]
 Skeleton = Annotated[
     str, typer.Option("--skeleton", metavar="FILE", help="Which joint of BVH files is which: `inspect` prints it.")
 ]

@@ -5,14 +5,11 @@ from typing import Annotated
 
 import typer
 
+from bumblebee.cli_files import CsvFps, Settings
 from bumblebee.errors import BadInput, plain
 from bumblebee.io.there import require_motions
 from bumblebee.learning.pretrained import require_policy
 
-CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md.")
-]
 _PIECE = 10.0  # s: the longest episode of a training
 
 

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bumblebee.cli_files import CsvFps, Settings
 from bumblebee.errors import BadInput
 from bumblebee.learning.pretrained import require_seen
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
+    from bumblebee.motion.one_file import FileConfig
     from bumblebee.view.sources import Entry
 
 PORT = 8765
@@ -34,10 +36,8 @@ def view(
         Path | None, typer.Option("--model", help="Declared MJCF that measured rollouts belong to.")
     ] = None,
     effects: Annotated[Path | None, typer.Option("--effects", help="effects.yaml of a diagnosis of them.")] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md."),
-    ] = None,
+    csv_fps: CsvFps = None,
+    settings: Settings = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Instead write replay.html, or film.gif, .webp or .mp4.")
     ] = None,
@@ -51,10 +51,12 @@ def view(
     require_seen(path)
     if out is not None:
         _claim(out, [given for given in (path, motions, model, effects) if given])
+    from bumblebee.motion.one_file import stated
     from bumblebee.view.shipped import at_hand
 
+    files = stated(settings or [], csv_fps=csv_fps)
     with at_hand(path) as place:
-        entries, title, make = _found(place, motions, model, effects, settings or [])
+        entries, title, make = _found(place, motions, model, effects, files)
         if out is None:
             _play(entries, title, port, meshes, ticks, make)
             return
@@ -79,10 +81,9 @@ def _claim(out: Path, inputs: list[Path]) -> None:
 
 
 def _found(
-    path: Path, motions: Path | None, model: Path | None, effects: Path | None, settings: list[str]
+    path: Path, motions: Path | None, model: Path | None, effects: Path | None, files: "FileConfig"
 ) -> "tuple[list[Entry], str, Callable[[], MjSpec] | None]":
     """Find what lies at the path: its entries, the page's title, and the spec of a robot of its own."""
-    from bumblebee.motion.one_file import stated
     from bumblebee.view.what import (
         evaluation_entries,
         is_dataset,
@@ -105,8 +106,8 @@ def _found(
         title = "Measured, and simulated in pale blue" + (" (declared) and green (corrected)" if effects else "")
         return entries, title, spec_of(declared)
     if is_policy(path):
-        return policy_entries(path, motions, stated(settings), print), f"{path.name}, live", None
-    return motion_entries(path, stated(settings), print), f"Motions of {path.name}", None
+        return policy_entries(path, motions, files, print), f"{path.name}, live", None
+    return motion_entries(path, files, print), f"Motions of {path.name}", None
 
 
 def play_shipped_policy(port: int = PORT, meshes: Path | None = None, ticks: int | None = None) -> None:

@@ -74,7 +74,7 @@ def test_read_motions_evaluate_and_view_say_in_the_same_line_what_is_skipped_and
     assert cli.run(["evaluate", "shipped", str(folder), "--csv-fps", "50", "--limit", "1"]) == 0
     assert line in capsys.readouterr().out.splitlines()
     page = tmp_path / "replay.html"
-    assert cli.run(["view", str(folder), "--set", "csv_fps=50", "--out", str(page), "--seconds", "0.2"]) == 0
+    assert cli.run(["view", str(folder), "--csv-fps", "50", "--out", str(page), "--seconds", "0.2"]) == 0
     assert line in capsys.readouterr().out.splitlines()
 
 

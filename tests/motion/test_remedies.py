@@ -92,7 +92,7 @@ def choices(said: str) -> list[list[str]]:
     """The options that a message offers, one list for each answer."""
     offered = re.search(r"Say it: (.*?) \(for the loop, in params\.yaml: ([\w., ]+)\)\.", said)
     assert offered, said
-    keys = set(re.findall(r"--set (\w+)=", offered[1]))
+    keys = set(re.findall(r"--set (\w+)=", offered[1].replace("--csv-fps ", "--set csv_fps=")))
     assert set(offered[2].split(", ")) == {f"motions.read.{key}" for key in keys}
     return [answer.split() for answer in offered[1].split(" or ")]
 

@@ -15,7 +15,7 @@ SHARED = next((p / "shared/data/motions" for p in Path(__file__).parents if (p /
 
 def test_a_csv_without_a_rate_is_asked_for_it(motions):
     path = motions.csv(motions.raw())
-    with pytest.raises(BadInput, match=r"expected a frame rate, .*a sprint. Say it: --set csv_fps=30") as caught:
+    with pytest.raises(BadInput, match=r"expected a frame rate, .*a sprint. Say it: --csv-fps 30") as caught:
         read_robot(path, path.read_bytes())
     assert "\n" not in str(caught.value)
     (came,) = read_robot(path, path.read_bytes(), RobotConfig(csv_fps=30))
