@@ -98,7 +98,7 @@ def train(
     """
     from bumblebee.api.policy_card import learnt_before
     from bumblebee.motion.filter import filter_clips
-    from bumblebee.motion.pieces import hold_out
+    from bumblebee.motion.pieces import hold_out, too_few
 
     config, out = _config(settings), Path(out).expanduser()
     require_ready(config, out, overwrite)
@@ -111,6 +111,8 @@ def train(
     split = hold_out(kept, config.held_out)
     held = sum(clip.split == "test" for clip in split)
     say(f"{len(split)} motions, {held} of them held out; {len(clips) - len(kept)} dropped by the filter")
+    if config.held_out and not held:
+        say(f"none is held out, so the trials show no motion that is new to the policy: {too_few(split)}")
     with _checkpoints(out, split, config, say) as folder:
         learner = make_learner(split, config, folder)
         train_for(learner, 60 * config.minutes)

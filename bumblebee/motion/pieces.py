@@ -71,16 +71,27 @@ def held_out(motions: Iterable[Named], share: float) -> set[str]:
     person's and somebody's retarget of it, under one name in two folders. A family of at least four motions has at
     least one held out and one left; a smaller one has none held out, and none has where `share` is 0.
     """
-    origins = [(one.name, one.family, origin(one.name, one.source)) for one in motions]
-    families: dict[str, set[str]] = defaultdict(set)
-    for _, family, motion in origins:
-        families[family].add(motion)
-    held: set[str] = set()
-    for members in families.values():
+    motions, held = list(motions), set[str]()
+    for members in _families(motions).values():
         if share > 0 and len(members) >= FAMILY_MINIMUM:
             count = min(max(1, round(share * len(members))), len(members) - 1)
             held |= set(sorted(members, key=_position)[:count])
-    return {name for name, _, motion in origins if motion in held}
+    return {one.name for one in motions if origin(one.name, one.source) in held}
+
+
+def too_few(motions: Iterable[Named]) -> str:
+    """How many motions it takes to hold one out, where no family has as many."""
+    family, members = max(_families(motions).items(), key=lambda pair: len(pair[1]))
+    kind = repr(family) if family else "the one of names that say none"
+    return f"it takes {FAMILY_MINIMUM} motions of one kind, by their names; the largest, {kind}, has {len(members)}"
+
+
+def _families(motions: Iterable[Named]) -> dict[str, set[str]]:
+    """Family -> its motions, each once whatever its pieces and forms."""
+    families: dict[str, set[str]] = defaultdict(set)
+    for one in motions:
+        families[one.family].add(origin(one.name, one.source))
+    return families
 
 
 def hold_out(clips: Iterable[Clip], share: float) -> list[Clip]:

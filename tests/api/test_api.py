@@ -157,6 +157,7 @@ def test_a_training_that_is_stopped_before_its_first_checkpoint_says_so(monkeypa
     with pytest.raises(KeyboardInterrupt):
         bb.train(STAND, "policy", minutes=0.005, worlds=8, say=told.append)
     assert told[-1] == "no checkpoint yet; the same command begins anew"
+    assert "none is held out" in told[1] and "it takes 4 motions of one kind" in told[1]
 
 
 def test_a_training_that_was_killed_goes_on(monkeypatch):

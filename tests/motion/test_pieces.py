@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bumblebee.motion.pieces import hold_out, motion_of, origin, split_long
+from bumblebee.motion.pieces import hold_out, motion_of, origin, split_long, too_few
 
 
 @pytest.mark.parametrize("seconds", [0.5, 0.8, 1.0, 1.59])
@@ -50,7 +50,9 @@ def test_a_family_of_four_has_one_held_out_and_one_left(motions, size, least):
         names = [f"jump{i}" for i in range(size)]
         count = len(held(hold_out(named(clip, names, "jump"), share)))
         assert least <= count <= size - 1
-    assert held(hold_out(named(clip, ["a", "b", "c"], "jump"), 0.9)) == set()
+    few = named(clip, ["a_p0", "a_p1", "b", "c"], "jump")
+    assert held(hold_out([*few, *named(clip, ["d", "e"])], 0.9)) == set()
+    assert too_few(few) == "it takes 4 motions of one kind, by their names; the largest, 'jump', has 3"
 
 
 def test_pieces_of_one_motion_stay_together(motions):

@@ -18,7 +18,7 @@ _COLUMNS = {"before": "declared", "after": "corrected", "oracle": "true", "floor
 
 
 def summary(document: dict[str, Any], rules: ReportThresholds | None = None) -> str:
-    """Warnings, a search that ended early first; effects with intervals, error before, after and floor, what is left."""
+    """Warnings, a search that ended early first, effects with intervals, error before, after and floor."""
     rules = rules or ReportThresholds()
     early, notes = early_first(document.get("notes", []))
     lines = [f"WARNING: {text}" for text in [*early, *document.get("warnings", [])]]
