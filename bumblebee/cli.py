@@ -13,7 +13,9 @@ import typer
 from bumblebee import __version__
 from bumblebee.commands import COMMANDS, Commands, missing
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
+from bumblebee.io.there import require_logs
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
+from bumblebee.ranges import Unfit
 from bumblebee.teller import Teller
 
 _EPILOG = "`bumblebee COMMAND --help` explains a command; docs/commands.md has an example of each."
@@ -67,6 +69,7 @@ def diagnose(
 
     Ctrl-C, or SIGTERM, ends the search and writes what it has found; a second one ends the process.
     """
+    require_logs(model, dataset)
     from bumblebee.diagnosis.config import DiagnosisConfig
     from bumblebee.diagnosis.dataset import open_session, read_held_out
     from bumblebee.diagnosis.diagnose import diagnose
@@ -238,6 +241,11 @@ def run(arguments: list[str]) -> int:
         if name and (error.name or "").split(".")[0] not in ("bumblebee", "tasks", "flows"):
             raise missing(error, name) from None
         raise
+    except Unfit as error:
+        option = f"--{error.field.replace('_', '-')}"
+        if not any(word.split("=")[0] == option for word in arguments):
+            raise
+        raise BadInput(option, error.expected, error.came) from None
     except typer.Abort:
         return EXIT_INTERRUPTED
     except _UNUSABLE as error:

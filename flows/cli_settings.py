@@ -25,7 +25,8 @@ def settings(
     if section:
         first = section.split(".")[0]
         if first not in SECTIONS:
-            raise BadInput(section, f"a section among {', '.join(SECTIONS)}", "none of them", nearest(first, SECTIONS))
+            do = nearest(first, SECTIONS) or "`bumblebee settings` prints all."
+            raise BadInput(section, f"a section among {', '.join(SECTIONS)}", "none of them", do)
     rows = [row for name in SECTIONS for row in keys(name, _class(name)) if _under(row[0], section)]
     if not rows:
         known = [part for row in keys(first, _class(first)) for part in accumulate(row[0].split("."), "{}.{}".format)]

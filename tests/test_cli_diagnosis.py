@@ -51,6 +51,21 @@ def data(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.parametrize("more", [(), ("--out", "found"), ("--quick",)])
+def test_paths_that_are_not_there_or_exchanged_are_said_first(data: Path, capsys, more: tuple[str, ...]) -> None:
+    model, folder = data / "model.xml", data / "set"
+    for paths, said in (
+        ((data / "nosuch.xml", folder), f"nosuch.xml: expected an MJCF file, came no such file or folder. `ls {data}`"),
+        ((model, data / "no"), f"rollouts/*.parquet, came no such file or folder. `ls {data}` lists what is there."),
+        ((folder, model), f"came the folder first. Exchange the two: {model} {folder}"),
+    ):
+        assert run("diagnose", *paths, *more) == 2
+        assert said in capsys.readouterr().err
+    for command in ("gap", "replay"):
+        assert run(command, folder, model, *(["--out", data / "out"] if command == "replay" else [])) == 2
+        assert "Exchange the two" in capsys.readouterr().err
+
+
 def test_a_first_look_writes_nothing(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(data.rglob("*"))
     assert run("diagnose", data / "model.xml", data / "set", "--quick") == 0

@@ -49,6 +49,24 @@ def test_a_path_that_is_not_there_is_refused_before_anything_slow_is_imported(li
     assert "nowhere: expected " in told.stderr and told.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("robot inspect nosuch.xml", "an MJCF file, came no such file or folder. `ls "),
+        ("train nosuch", "or a motion file, came no such file or folder. `ls "),
+        ("settings nosuch", "none of them. `bumblebee settings` prints all."),
+        (f"train {HOME} --minutes 0", "--minutes: expected a number above 0, at most 100,000, came 0.0"),
+        ("evaluate shipped --limit 1 --repeats=0", "--repeats: expected "),
+    ],
+)
+def test_a_refusal_names_the_users_option_and_what_to_do(line, said, capsys):
+    assert run(*line.split()) == 2
+    told = capsys.readouterr().err
+    assert said in told and told.count("\n") == 1
+    if "`ls " in told:
+        assert Path(re.search(r"`ls (\S+)`", told)[1]).is_dir()
+
+
 def test_without_a_command_all_are_listed(capsys):
     assert run() == 0
     said = capsys.readouterr().out

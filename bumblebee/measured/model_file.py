@@ -10,6 +10,7 @@ import mujoco
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_text
+from bumblebee.io.there import require_there
 from bumblebee.robot.drives import ON_JOINT, explicit_drives
 
 LARGEST = 64 << 20  # bytes of the XML itself; the largest public robot models have 1 MB
@@ -31,6 +32,7 @@ def load_model(path: Path) -> mujoco.MjModel:
 def load_spec(path: Path) -> mujoco.MjSpec:
     """Read an MJCF file as an editable spec that compiles; `BadInput` with MuJoCo's own words where it does not."""
     path = Path(path)
+    require_there(path, "an MJCF file")
     text = read_text(path, LARGEST)
     if "\0" in text or "<" not in text:
         raise BadInput(path, "an MJCF model that loads", "a file that is no XML")

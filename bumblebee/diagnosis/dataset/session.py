@@ -25,6 +25,7 @@ from bumblebee.diagnosis.simulation import (
 )
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, Usable
 from bumblebee.errors import BadInput
+from bumblebee.io.there import require_logs
 from bumblebee.measured.checks import beyond
 from bumblebee.measured.model_file import load_spec
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
@@ -77,6 +78,7 @@ def open_session(
     Raises:
         BadInput: no rollout that can be used, or one convention that is wrong in all of them.
     """
+    require_logs(Path(model), Path(dataset))
     rules = thresholds or DatasetThresholds()
     errors, reviewed = [], []
     files = rollout_files(dataset)
