@@ -29,7 +29,7 @@ def _fetch(options: argparse.Namespace) -> int:
     if named is None:
         raise BadInput("model", "<name>@<alias> or <name>/<version>", options.model, "Such as expert-c0@champion.")
     if not options.workspace.is_dir():
-        raise BadInput(options.workspace, "a workspace", "no folder", "Give --workspace.")
+        raise BadInput(options.workspace, "a workspace", "no folder", registry.NO_WORKSPACE)
     server = require_server(options.server, "--server") if options.server else ""
     out = options.out.absolute()
     os.chdir(options.workspace)  # the store is the workspace's

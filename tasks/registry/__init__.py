@@ -6,6 +6,7 @@ Where `lab.yaml` names nothing but `tracking`, a lab's server, all goes through 
 """
 
 from tasks.registry.models import (
+    NO_WORKSPACE,
     champion_tags,
     champion_version,
     describe,
@@ -21,6 +22,7 @@ from tasks.registry.store import DATABASE, NO_TELEMETRY, ensure_database, experi
 __all__ = [
     "DATABASE",
     "NO_TELEMETRY",
+    "NO_WORKSPACE",
     "champion_tags",
     "champion_version",
     "describe",

@@ -99,6 +99,9 @@ def describe(name: str, text: str) -> None:
     prepare().update_registered_model(name, fitted(text, LONGEST_DESCRIPTION, CARD))
 
 
+NO_WORKSPACE = "No loop has run there; --workspace takes the folder of one that has: runs/NAME, or the checkout."
+
+
 def fetch(name: str, wanted: str, out: Path, server: str = "") -> Path:
     """Copy a version's files from the store of the workspace in this folder, or from a server.
 
@@ -116,7 +119,7 @@ def fetch(name: str, wanted: str, out: Path, server: str = "") -> Path:
 
     here = not server and read_lab(Path.cwd()) is None and read_tracking(Path.cwd()) is None
     if here and not (SERVERS / DATABASE).exists():
-        raise BadInput(Path.cwd() / SERVERS / DATABASE, "a workspace's registry", "no file", "Give its --workspace.")
+        raise BadInput(Path.cwd() / SERVERS / DATABASE, "a workspace's registry", "no file", NO_WORKSPACE)
     if out.exists():
         raise BadInput(out, "a new folder", "one that exists", "Choose another --out.")
     client = of_server(server) if server else prepare()

@@ -101,8 +101,11 @@ def test_the_examples_of_the_page_run_as_they_stand(fetched: Path, capsys: pytes
         (["expert-c0@nobody", "--out", "x"], "a version in this workspace's registry"),
         (["expert-c0", "--out", "x"], "<name>@<alias>"),
         (["expert-c0/1", "--out", "data"], "a new folder"),
-        (["expert-c0/1", "--out", "x", "--workspace", "data"], "a workspace's registry"),
-        (["expert-c0/1", "--out", "x", "--workspace", "nowhere"], "a workspace"),
+        (
+            ["expert-c0/1", "--out", "x", "--workspace", "data"],
+            "a workspace's registry, came no file. No loop has run there",
+        ),
+        (["expert-c0/1", "--out", "x", "--workspace", "nowhere"], "a workspace, came no folder. No loop has run there"),
     ],
 )
 def test_what_cannot_be_fetched_is_refused_in_one_line_and_nothing_is_written(
