@@ -54,8 +54,8 @@ def inspect(
             if row.name and len(shown_rows) < rows:
                 shown_rows.append(row)
     _print_table(shown_rows, path)
-    if counts.motions > len(shown_rows):
-        print(f"... and {counts.motions - len(shown_rows):,} more motions (--rows)")
+    if more := counts.motions - len(shown_rows):
+        print(f"... and {count(more, 'more motion')} (--rows)")
     if layout := layouts.text():
         print(layout)
     print(counts)
@@ -230,6 +230,7 @@ def _line(text: str) -> str:
 def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
     """The motion of that name at a path, or the only one."""
     from bumblebee.motion.convert import clips_at
+    from bumblebee.motion.nothing import nothing
 
     names: list[str] = []
     reasons: list[tuple[str, str]] = []
@@ -247,8 +248,7 @@ def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
     some = ", ".join(names[:_NAMED]) + (" ..." if len(names) > _NAMED else "")
     if names:
         raise BadInput(path, "the name of one motion", repr(name) if name else "several motions", f"--motion: {some}")
-    first = ": ".join(reasons[0]) if reasons else ""
-    raise BadInput(path, "a motion of the robot", f"none that can be used; the first: {first}"[:1500])
+    raise nothing(path, "a motion of the robot", reasons)
 
 
 def _claim_picture(out: Path, path: Path) -> None:

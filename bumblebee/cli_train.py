@@ -40,6 +40,7 @@ def train(
     from bumblebee.motion.few_lines import said_of
     from bumblebee.motion.folder import ReadConfig, read_folder
     from bumblebee.motion.one_file import stated
+    from bumblebee.report.wording import plural
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
@@ -51,8 +52,8 @@ def train(
     reading = read_folder(folder, files, cache=user_cache())
     for line in reading.skipped_lines:
         print(line)
-    counts = f"{len(reading.clips)} motions of at most {_PIECE:g} s read, {len(reading.skipped)} files skipped"
-    print(counts, flush=True)
+    read, skipped = plural(len(reading.clips), "motion"), plural(len(reading.skipped), "file")
+    print(f"{read} of at most {_PIECE:g} s read, {skipped} skipped", flush=True)
 
     def say(text: str) -> None:
         print(plain(text), flush=True)

@@ -48,7 +48,7 @@ def test_inspect_says_what_is_there_and_what_is_wrong(folder, capsys):
     assert run("inspect", folder) == 0  # the pickle is still read
     assert "sway.csv: expected a frame rate, which a CSV file does not hold" in capsys.readouterr().out
     assert run("inspect", folder, "--rows", 1, "--csv-fps", 50) == 0
-    assert "... and 1 more motions (--rows)" in capsys.readouterr().out
+    assert "... and 1 more motion (--rows)" in capsys.readouterr().out
 
 
 def test_inspect_of_nothing_readable_is_status_two_and_one_line(folder, capsys):
@@ -143,7 +143,7 @@ def test_play_asks_for_what_it_needs(folder, tmp_path, capsys, monkeypatch):
         ((folder, "--out", tmp_path / "a.gif", "--motion", "run"), "expected the name of one motion, came 'run'"),
         (
             (folder / "bad.pkl", "--out", tmp_path / "a.gif"),
-            "expected a motion of the robot, came none that can be used",
+            "in/bad.pkl: expected a whole pickle, came a broken one",
         ),
         ((folder / "walk.pkl", "--out", tmp_path / "a.avi"), "a name that ends in .gif, .webp, .mp4 or .png"),
         (

@@ -16,6 +16,7 @@ from bumblebee.learning import pretrained
 from bumblebee.learning.trial import success_by_family
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.licence_terms import counted
+from bumblebee.report.wording import plural
 
 SPLITS = {"train": "trained on", "test": "held out"}
 GOES_ON = SPLITS | {"test": "held out here, though the policy that it goes on from may have learnt them"}
@@ -107,7 +108,7 @@ def tried(trials: pd.DataFrame, splits: Mapping[str, str] = SPLITS, noise: float
         rate, key = success_rate(own["success"].to_numpy(), names), mean_by_motion(own["key_error"].to_numpy(), names)
         joint = mean_by_motion(own["joint_error"].to_numpy(), names)
         yield (
-            f"- {what}: follows {100 * rate.value:.0f} % of {rate.motions} motions to the end (95 % interval "
+            f"- {what}: follows {100 * rate.value:.0f} % of {plural(rate.motions, 'motion')} to the end (95 % interval "
             f"{100 * rate.low:.0f} to {100 * rate.high:.0f}); key bodies {1000 * key.value:.0f} mm off, joints "
             f"{joint.value:.3f} rad"
         )

@@ -99,6 +99,7 @@ def train(
     from bumblebee.api.policy_card import learnt_before
     from bumblebee.motion.filter import filter_clips
     from bumblebee.motion.pieces import hold_out, too_few
+    from bumblebee.report.wording import plural
 
     config, out = _config(settings), Path(out).expanduser()
     require_ready(config, out, overwrite)
@@ -110,7 +111,7 @@ def train(
         raise BadInput("motions", "a motion that the robot can do", came)
     split = hold_out(kept, config.held_out)
     held = sum(clip.split == "test" for clip in split)
-    say(f"{len(split)} motions, {held} of them held out; {len(clips) - len(kept)} dropped by the filter")
+    say(f"{plural(len(split), 'motion')}, {held} of them held out; {len(clips) - len(kept)} dropped by the filter")
     if config.held_out and not held:
         say(f"none is held out, so the trials show no motion that is new to the policy: {too_few(split)}")
     with _checkpoints(out, split, config, say) as folder:

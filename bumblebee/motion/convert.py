@@ -19,6 +19,7 @@ from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licence_table import LICENCES, Stated, read_table, stated_of, table_of
 from bumblebee.motion.licences import licence_of
 from bumblebee.motion.listing import Found, Motion, find_motions, reason_of
+from bumblebee.motion.nothing import nothing
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
@@ -89,8 +90,7 @@ def convert(
     clips = _clips(path, config, done, lambda place, reason: tell(f"{place}: {reason}") if tell else None)
     first = next(clips, None)
     if first is None:
-        came = f"{done.files:,} files with none that is usable; the first: {': '.join(done.skipped[0])}"
-        raise BadInput(path, "a motion of the robot", came)
+        raise nothing(path, "a motion of the robot", done.skipped)
     counted = _counted(itertools.chain([first], clips), done)
     if config.to == LIBRARY:
         write_library(out, counted)

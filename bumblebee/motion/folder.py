@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.io.there import require_motions
 from bumblebee.motion.captions import family_of
@@ -23,6 +22,7 @@ from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licence_table import stated_of
 from bumblebee.motion.licences import licence_of
 from bumblebee.motion.naming import distinct
+from bumblebee.motion.nothing import nothing
 from bumblebee.motion.pieces import split_long
 from bumblebee.motion.ready import Ready
 from bumblebee.motion.settings import ReadConfig
@@ -84,7 +84,8 @@ def read_each(
         take(clip)
         count += 1
     if not count:
-        raise _nothing(path, heard)
+        do = "" if heard.skipped else "docs/data.md has the formats that are read."
+        raise nothing(path, "motions that can be read", heard.skipped, do)
     return Reading([], skipped_table(heard.skipped), noted_table(heard.notes), account(say, heard.texts))
 
 
@@ -158,15 +159,6 @@ def _clips(ready: Ready, said: Described, file: File, config: ReadConfig) -> lis
 
 def _seconds(ready: Ready) -> float:
     return (len(ready.raw.root_pos) - 1) / ready.raw.fps
-
-
-def _nothing(path: Path, heard: _Heard) -> BadInput:
-    if not path.is_dir() and len(heard.skipped) == 1:
-        expected, known, came = heard.skipped[0][1].removeprefix("expected ").partition(", came ")
-        return BadInput(path, expected, came) if known else BadInput(path, "motions that can be read", expected)
-    do = "" if heard.skipped else "docs/data.md has the formats that are read."
-    first = f"; the first: {heard.skipped[0][0]}: {heard.skipped[0][1]}" if heard.skipped else ""
-    return BadInput(path, "motions that can be read", f"{heard.files} files, none of them usable{first}", do)
 
 
 def skipped_table(rows: list[tuple[str, str]]) -> pd.DataFrame:

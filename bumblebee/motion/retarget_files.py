@@ -17,6 +17,7 @@ from bumblebee.motion.convert import Converted, Names, claim
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.licence_table import LICENCES, Stated, table_of
 from bumblebee.motion.listing import Found, find_motions, reason_of
+from bumblebee.motion.nothing import nothing
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.mapping import Robot, g1, read_robot
@@ -100,8 +101,7 @@ def retarget_files(
             if tell:
                 tell(f"{job.place}: {made.reason}" if made.reason else "", count)
         if not rows:
-            came = f"{done.files:,} files with none that is usable; the first: {': '.join(done.skipped[0])}"
-            raise BadInput(path, "a motion of a person", came[:1500])
+            raise nothing(path, "a motion of a person", done.skipped)
         (folder / LICENCES).write_text(table_of(rows), encoding="utf-8")
     return done
 

@@ -11,6 +11,7 @@ from bumblebee.learning.trial_folder import ENDS, FOLLOWED, KeptRollout, is_kept
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.convert import clips_at
 from bumblebee.motion.few_lines import said_of
+from bumblebee.motion.nothing import nothing
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.report.replay import Drawn, side_by_side
 from bumblebee.robot.facts import joint_names
@@ -85,9 +86,8 @@ def _clips(path: Path, files: FileConfig, say: Callable[[str], None], fps: float
     skipped: list[tuple[str, str]] = []
     clips = [clip for clip, _ in clips_at(path, files, lambda *said: skipped.append(said), fps)]
     if not clips:
-        came = f"none that can be used; the first: {': '.join(skipped[0])}" if skipped else "none"
         remedy = f"`bumblebee motions inspect {path}` lists each file with its reason."
-        raise BadInput(path, "a motion of the robot", came[:1500], remedy)
+        raise nothing(path, "a motion of the robot", skipped, remedy)
     for line in said_of("skipped", skipped):
         say(line)
     return clips

@@ -105,7 +105,7 @@ def test_places_that_are_inputs_are_refused(source, tmp_path):
 def test_nothing_usable_writes_nothing(tmp_path, source):
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad/a.pkl").write_bytes(b"")
-    with pytest.raises(BadInput, match=r"came 1 files with none that is usable; the first: a\.pkl: expected a pickle"):
+    with pytest.raises(BadInput, match=r"came none that can be used; the first: a\.pkl: expected a pickle"):
         convert(tmp_path / "bad", tmp_path / "out", ConvertConfig("mjlab"))
     assert not (tmp_path / "out").exists()
 

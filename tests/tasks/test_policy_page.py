@@ -103,7 +103,7 @@ def test_the_examples_of_the_page_run_as_they_stand(fetched: Path, capsys: pytes
         (["expert-c0/1", "--out", "data"], "a new folder"),
         (
             ["expert-c0/1", "--out", "x", "--workspace", "data"],
-            "a workspace's registry, came no file. No loop has run there",
+            "registry, came no file. No loop has run there",
         ),
         (["expert-c0/1", "--out", "x", "--workspace", "nowhere"], "a workspace, came no folder. No loop has run there"),
     ],
