@@ -1,6 +1,7 @@
 """`bumblebee motions`: tables that add up, films that exist, status 2 and one line for what cannot be done."""
 
 import csv
+import re
 import sys
 
 import numpy as np
@@ -49,6 +50,15 @@ def test_inspect_says_what_is_there_and_what_is_wrong(folder, capsys):
     assert "sway.csv: expected a frame rate, which a CSV file does not hold" in capsys.readouterr().out
     assert run("inspect", folder, "--rows", 1, "--csv-fps", 50) == 0
     assert "... and 1 more motion (--rows)" in capsys.readouterr().out
+
+
+def test_inspect_calls_two_motions_of_one_name_as_play_does(folder, capsys):
+    (folder / "again").mkdir()
+    (folder / "again/walk.pkl").write_bytes((folder / "walk.pkl").read_bytes())
+    assert run("inspect", folder, "--csv-fps", 50) == 0
+    shown = re.findall(r"^(\S+) +\S+\.(?:pkl|csv) ", capsys.readouterr().out, re.M)
+    assert run("play", folder, "--out", folder.parent / "a.gif", "--csv-fps", 50) == 2
+    assert f"--motion: {', '.join(shown)}\n" in capsys.readouterr().err and len(set(shown)) == 3
 
 
 def test_inspect_of_nothing_readable_is_status_two_and_one_line(folder, capsys):

@@ -1,13 +1,15 @@
 """A table of what lies at a path: each motion with its format, rate, length, height, captions, licence and problems."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.io.names import safe_stem
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.convert import Names
 from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.read import format_of
 from bumblebee.motion.human.motion import HumanMotion, Role
@@ -88,8 +90,16 @@ def inspect(path: Path, config: FileConfig | None = None) -> Iterator[list[Inspe
         path: a file, a folder or a motion library.
         config: what files may leave unsaid.
     """
+    names = Names()
     for found in find_motions(path, config):
-        yield rows_of(found)
+        yield [_named(row, names) for row in rows_of(found)]
+
+
+def _named(row: Inspected, names: Names) -> Inspected:
+    """The row with the name by which `play`, `view` and `convert` know its motion."""
+    if not row.name or row.problem:
+        return row
+    return replace(row, name=names.distinct(safe_stem(row.name, "motion"), row.file.parent.name))
 
 
 def rows_of(found: Found) -> list[Inspected]:
