@@ -10,7 +10,7 @@ TRAVELS = 1.0
 """Horizontal distance from its start that the root of a motion which counts as walking reaches [m]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Clip:
     """One motion of the G1, sampled evenly; arrays are float32; two clips are equal only if they are one object.
 
@@ -49,6 +49,10 @@ class Clip:
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
         return (self.frames - 1) / self.fps
+
+    def __repr__(self) -> str:
+        kind = f", {self.family}" if self.family else ""
+        return f"<Clip {self.name!r}: {self.duration:.1f} s at {self.fps:g} Hz, {self.joint_pos.shape[1]} joints{kind}>"
 
 
 @dataclass(frozen=True)

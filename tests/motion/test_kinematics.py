@@ -24,6 +24,7 @@ def test_every_body_stands_where_mujoco_puts_it(poses):
     data = mujoco.MjData(model)
     bodies = forward_bodies(*poses)
     clip = make_clip("random", 50, *poses)
+    assert str(clip) == "<Clip 'random': 0.2 s at 50 Hz, 23 joints>"
     for frame, parts in enumerate(zip(*poses, strict=True)):
         data.qpos[:] = np.concatenate(parts)
         mujoco.mj_kinematics(model, data)

@@ -36,7 +36,7 @@ JUDGED_TWICE = "the held-out rollouts decided which effects were accepted (model
 NO_HEIGHT = "no base_pos: the base's height is estimated from stance, its error is a nuisance parameter"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Session:
     """A model and its rollouts, ready to compare."""
 
@@ -68,6 +68,13 @@ class Session:
     def ids(self, which: Sequence[int]) -> list[str]:
         """Rollout ids of indices."""
         return [self.rollouts[i].rollout_id for i in which]
+
+    def __repr__(self) -> str:
+        seconds = sum(float(rollout.time[-1] - rollout.time[0]) for rollout in self.rollouts)
+        rates = ", ".join(f"{hz:g}" for hz in sorted({rollout.control_hz for rollout in self.rollouts}))
+        count = f"{len(self.rollouts)} rollouts ({len(self.holdout)} held out), {len(self.set_aside)} set aside"
+        joints = ", ".join(self.plant.joints)
+        return f"<Session {self.spec.modelname!r}: {count}; {seconds:.1f} s at {rates} Hz; joints {joints}>"
 
 
 def open_session(

@@ -1,5 +1,7 @@
 """Held-out rollouts: whole motions of every cluster, so that no repeat of a fitted motion is among them."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -38,6 +40,9 @@ def test_without_names_every_fourth_rollout_is_held_out(count: int, held: int) -
 def test_every_horizon_compares_the_state_at_its_own_end() -> None:
     rollouts = arm.simulate({}, count=2, seconds=3.0)
     session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    assert re.fullmatch(
+        r"<Session '[^']*': 2 rollouts \(1 held out\), 0 set aside; \S+ s at \d+ Hz; joints .*>", repr(session)
+    )
     windows = horizon_windows(session, [0, 1], budget=8).windows
     assert set(windows) == set(HORIZONS)
     for name, part in windows.items():
