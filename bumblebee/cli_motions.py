@@ -10,6 +10,7 @@ import typer
 
 from bumblebee.cli_files import CsvFps, Settings
 from bumblebee.errors import BadInput
+from bumblebee.teller import Teller
 
 if TYPE_CHECKING:
     from bumblebee.motion.clip import Clip
@@ -160,13 +161,18 @@ def play(
         _claim_picture(out, path)
     elif not _display():
         raise BadInput("--out", "film.gif or film.png on a machine without a display", "nothing")
-    clip = _chosen(path, motion, _options(csv_fps, settings, skeleton))
+    options = _options(csv_fps, settings, skeleton)
+    with Teller() as say:
+        say(f"reading {path}")
+        clip = _chosen(path, motion, options)
+        if out is not None:
+            from bumblebee.report.playback import PlayConfig, write_pictures
+
+            say(f"drawing {clip.name}")
+            said = write_pictures(out, clip, PlayConfig(panels=panels, start=seconds[0], end=seconds[1]))
     if out is None:
         _window(clip)
         return
-    from bumblebee.report.playback import PlayConfig, write_pictures
-
-    said = write_pictures(out, clip, PlayConfig(panels=panels, start=seconds[0], end=seconds[1]))
     print(f"{clip.name}: {said}")
     print(f"written: {out}")
 

@@ -130,6 +130,7 @@ def test_play_makes_a_film_and_a_filmstrip_with_and_without_opengl(folder, tmp_p
 
     monkeypatch.setattr(playback, "render_frames", drawn if renders else lambda *_: (None, "egl: no device"))
     assert run("play", folder / "walk.pkl", "--out", tmp_path / "film.gif") == 0
+    assert "] drawing walk\n" in capsys.readouterr().out
     with Image.open(tmp_path / "film.gif") as film:
         assert film.size == (320, 300) and 5 < film.n_frames <= 15  # the encoder joins frames that are alike
         shown = [(film.seek(number), film.info["duration"])[1] for number in range(film.n_frames)]
