@@ -98,7 +98,6 @@ def read_file(path: Path, config: ReadConfig | None = None) -> list[Clip]:
 class _Heard:
     """Notes on the files while they are read."""
 
-    files: int = 0
     skipped: list[tuple[str, str]] = field(default_factory=list)
     notes: list[tuple[str, str]] = field(default_factory=list)
     texts: list[Described] = field(default_factory=list)
@@ -111,7 +110,6 @@ def _groups(
     root = path if path.is_dir() else path.parent
     for file in each_file(path, config, cache):
         name = shown(os.path.relpath(file.place or file.source.path, root))
-        heard.files += not file.place
         if file.reason:
             heard.skipped.append((name, file.reason))
         heard.skipped += [(f"{name}, {one.part}", one.reason) for one in file.refused]
