@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bumblebee.cli_files import CsvFps
 from bumblebee.errors import BadInput, plain
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ Workspace = Annotated[
     Path, typer.Option("--workspace", help="Folder with .servers, for a registered policy; by default this one.")
 ]
 Motions = Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")]
+Logs = Annotated[Path, typer.Option("--out", help="Dataset folder; a run adds a journal and a rollout.")]
 Bounds = Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")]
 
 
@@ -44,6 +46,7 @@ def sheet(
     policy: Policy,
     clips: Annotated[list[str] | None, typer.Option("--clip", help="A motion to try; repeat it. All without.")] = None,
     motions: Motions = "embedded",
+    csv_fps: CsvFps = None,
     robots: Annotated[int, typer.Option("--robots", min=1, max=1000, help="Robots that differ, for each motion.")] = 16,
     minutes: Annotated[float, typer.Option("--minutes", min=0, help="No motion begins after so long.")] = 10.0,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the robots, starts and sensor noise.")] = 0,
@@ -65,7 +68,7 @@ def sheet(
     refuse_existing(out)
     try_output(out)
     bounds = read_limits(limits) if limits else Limits()
-    chosen = _clips(motions, clips or [])
+    chosen = _clips(motions, clips or [], csv_fps)
     with _exported(policy, workspace) as folder, progress(len(chosen), "run sheet", "motions") as shown:
         loaded = ExportedPolicy.load(folder)
         made = make_sheet(loaded, chosen, robots, bounds, seed, 60 * minutes, lambda said: shown.update(1, said))
@@ -88,9 +91,8 @@ def run(
     robot: Annotated[str, typer.Option("--robot", help=_WIRES)] = "sim",
     at: At = "",
     motions: Motions = "embedded",
-    out: Annotated[Path, typer.Option("--out", help="Dataset folder; a run adds a journal and a rollout.")] = Path(
-        "deployed"
-    ),
+    csv_fps: CsvFps = None,
+    out: Logs = Path("deployed"),
     limits: Bounds = None,
     workspace: Workspace = Path(),
     sheet: Annotated[
@@ -121,7 +123,7 @@ def run(
     if not unattended:
         _require_keys()
     tried = read_sheet(sheet) if sheet else None
-    (chosen,) = _clips(motions, [clip])
+    (chosen,) = _clips(motions, [clip], csv_fps)
     with _exported(policy, workspace) as folder:
         line = before_run(tried, ExportedPolicy.load(folder).sha256, chosen, bounds) if tried else ""
         job = Run(folder, chosen, robot, out, at, compensation, bounds, unattended=unattended, slow=slow,
@@ -239,19 +241,22 @@ def _exported(policy: str, workspace: Path) -> Iterator[Path]:
             yield Path(policy)
 
 
-def _clips(motions: str, names: Sequence[str]) -> "list[Clip]":
+def _clips(motions: str, names: Sequence[str], csv_fps: float | None) -> "list[Clip]":
     """Motions by their names; all without."""
     from bumblebee.motion.embedded import EmbeddedConfig, make
     from bumblebee.motion.embedded.kinds import kinds
     from bumblebee.motion.folder import read_folder
     from bumblebee.motion.settings import ReadConfig
+    from bumblebee.report.wording import plural
 
     if motions == "embedded":
         made = {kind.name: partial(make, kind, 0, EmbeddedConfig()) for kind in kinds()}
     else:
-        made = {clip.name: partial(lambda clip: clip, clip) for clip in read_folder(Path(motions), ReadConfig()).clips}
+        read = read_folder(Path(motions), ReadConfig(csv_fps=csv_fps)).clips
+        made = {clip.name: partial(lambda clip: clip, clip) for clip in read}
     for name in names:
         if name not in made:
             near = difflib.get_close_matches(name, made, 3) or list(made)[:3]
-            raise BadInput("--clip", f"one of {len(made)} motions", repr(name)[:60], f"Such as {', '.join(near)}.")
+            known = plural(len(made), "motion")
+            raise BadInput("--clip", f"one of {known}", repr(name)[:60], f"Such as {', '.join(near)}.")
     return [made[name]() for name in names or made]

@@ -1,4 +1,4 @@
-"""Options of all commands that read motion files: what the files leave unsaid."""
+"""Options of the commands that read motion files: what the files leave unsaid."""
 
 from typing import Annotated
 

@@ -146,5 +146,5 @@ def test_many_notes_are_few_lines_and_all_of_them_in_a_table(capsys):
 
 def test_an_empty_folder_is_bad_input():
     Path("mine").mkdir()
-    with pytest.raises(BadInput, match="came none. docs"):
+    with pytest.raises(BadInput, match=r"came none\. docs"):
         motions.gather(motions.MotionsConfig(source="mine"), lambda clip: None)

@@ -7,6 +7,8 @@ import pytest
 
 from bumblebee import cli_deploy
 from bumblebee.deploy.stand_in_effects import read_sealed
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.motion.formats.write import write_motion
 from tests.test_commands import run
 
 ALONE = ("--unattended", "--clip", "squat")
@@ -33,6 +35,13 @@ def test_what_cannot_be_run_is_one_line(capsys: pytest.CaptureFixture[str], tmp_
     ):
         assert expected in refused(capsys, *words, *(("--out", out) if words[0] == "run" else ()))
     assert not out.exists()
+
+
+def test_csv_files_take_their_rate_as_the_line_asks_for_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    write_motion(tmp_path, make_library(EmbeddedConfig(families=("stand",), limit=1))[0], "g1_csv")
+    words = ("sheet", "shipped", "--motions", tmp_path, "--clip", "nosuch")
+    said = re.search(r"Say it: (--csv-fps) (\d+) ", refused(capsys, *words))
+    assert said and "one of 1 motion, came 'nosuch'" in refused(capsys, *words, *said.groups())
 
 
 def test_the_worn_robot_of_the_docs_is_sealed_with_what_they_say() -> None:
