@@ -35,5 +35,5 @@ def waves(frame: str) -> Callable[[float], tuple[str, ...]]:
 
 
 def fixed(*rows: tuple[Any, ...]) -> Callable[[Any, int], Rows]:
-    """The same rows for every joint."""
+    """Rows that are alike on every joint."""
     return lambda data, j: iter(rows)

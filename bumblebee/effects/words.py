@@ -1,4 +1,4 @@
-"""What is said of an effect that the drives undo."""
+"""Words for an effect that the drives undo."""
 
 from typing import Any
 

@@ -1,1 +1,1 @@
-"""What a link weighs, and what pulls at it."""
+"""Links: their mass, and forces on them."""

@@ -1,1 +1,1 @@
-"""What becomes of a command before the servo follows it."""
+"""Commands on their way to the servo."""

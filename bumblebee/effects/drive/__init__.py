@@ -1,1 +1,1 @@
-"""What a drive does with its gains and its torque."""
+"""Drives: their gains, their torque and its limits."""

@@ -1,1 +1,1 @@
-"""What rubs on a joint."""
+"""Friction on a joint."""

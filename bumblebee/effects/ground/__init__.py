@@ -1,1 +1,1 @@
-"""What the robot stands on and touches."""
+"""Ground, slope and surfaces."""

@@ -1,1 +1,1 @@
-"""What sits on a joint beside friction."""
+"""Inertia, springs and ripple on a joint."""

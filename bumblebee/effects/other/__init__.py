@@ -1,1 +1,1 @@
-"""What has no name of its own."""
+"""Laws without a name of their own."""

@@ -1,1 +1,1 @@
-"""What a sensor reports that is not so."""
+"""Sensors that report something else."""

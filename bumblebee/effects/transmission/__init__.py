@@ -1,1 +1,1 @@
-"""What lies between a motor and its link."""
+"""Transmission between a motor and its link."""
