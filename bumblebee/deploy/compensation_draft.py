@@ -80,7 +80,7 @@ class Draft:
         return Draft(self.robot, self.limits, **deepcopy(own))
 
     def load(self, body: str) -> Load:
-        """What a body carries so far."""
+        """Load that a body carries so far."""
         model = self.robot.model
         mass, com = float(model.body(body).mass[0]), tuple(map(float, model.body(body).ipos))
         return self.loads.get(body, Load(body, (mass, mass), (com, com)))

@@ -64,7 +64,7 @@ class Kind:
     """
 
     on: Literal["joint", "body", "geom", "whole"] = "joint"
-    """What it sits on."""
+    """Part of the robot that it sits on."""
     base: bool = False
     """Whether that is the body of a floating base alone."""
     parameters: tuple[Parameter, ...] = ()

@@ -105,7 +105,7 @@ def _on_whole(plant: Plant, rules: CandidateThresholds) -> list[Candidate]:
 
 
 def _under_floating_base(plant: Plant, rule: BodySteps) -> list[Candidate]:
-    """What a floating base has beside, and what the ground may be else."""
+    """Candidates of a floating base, and of the ground."""
     if not plant.floating:
         return []
     found = []

@@ -1,4 +1,4 @@
-"""What a step of the search may ask for: it reads the state, and `steps.go` alone changes it.
+"""Changes that a step of the search may ask for: it reads the state, and `steps.go` alone changes it.
 
 A step is a generator. It yields one change after the other, goes on when each was made, is told whether the model is
 another one now, and returns what it has found:

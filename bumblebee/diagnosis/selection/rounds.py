@@ -138,7 +138,7 @@ PROPOSALS = (
 )
 """Those of a round, in the order in which they are asked."""
 Kept = dict[str, tuple[Any, list[Trial] | None]]
-"""What proposals have answered, and while what stays."""
+"""Answers of proposals, and what must stay for them to hold."""
 
 
 def ask(now: Round, proposals: Sequence[Proposal], kept: Kept) -> bool:

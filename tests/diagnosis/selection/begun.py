@@ -32,7 +32,7 @@ def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML, windows: int 
 
 
 def answered(step: Asking[T], make: Callable[[Change], object] = lambda change: False) -> tuple[T, list[Change]]:
-    """What a step returns, and the changes that it asked for; `make` is told each."""
+    """A step's result, and the changes that it asked for; `make` is told each."""
     asked: list[Change] = []
     while True:
         try:
