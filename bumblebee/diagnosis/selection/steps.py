@@ -85,7 +85,7 @@ def _begin_far_off(run: SearchState, change: FarOff) -> None:
 
 
 def _begin_anew(run: SearchState, change: Windows) -> None:
-    """Go on from other windows: what was tried in vain may be tried again; many effects are not fitted at once a second time."""
+    """Go on from other windows; what was tried in vain may be tried again, many effects at once may not."""
     run.problem, run.holdout, run.fit = change.problem, change.holdout, change.fit
     run.keep = screening_windows(run.problem, run.config.screen_windows)
     run.weights = window_weights(run.fit.clean(run.problem))
