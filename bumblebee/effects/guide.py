@@ -30,19 +30,20 @@ def page() -> str:
 def _room(kinds: list[Kind]) -> Iterator[str]:
     title = inspect.getdoc(import_module(type(kinds[0]).__module__.rpartition(".")[0])) or ""
     yield from ("", f"## {title.rstrip('.')}", "")
-    yield from ("| effect | what it is | parameters | by | experiment |", "|---|---|---|---|---|")
+    yield from ("| effect, parameters | what it is, its law, the experiment |", "|---|---|")
     yield from map(_row, kinds)
 
 
 def _row(kind: Kind) -> str:
     parts = (inspect.getdoc(inspect.getmodule(type(kind))), inspect.getdoc(type(kind)))
     what = "<br>".join(" ".join((part or "").split()) for part in parts)
-    numbers = ", ".join(f"{p.name} {f'[{p.unit}]' if p.unit else ''}".strip() for p in kind.parameters)
+    numbers = "<br>".join(f"{p.name} [{p.unit or '1'}]".replace(" ", "&nbsp;") for p in kind.parameters)
     by = {(True, False): "MJCF", (True, True): "MJCF; with " + kind.hooked + " a hook"}
     carried = by.get((kind.native, kind.hooks), "MJCF in part, hook" if kind.added else "hook")
     grows = "; nq grows" if kind.structural and kind.hooked == "encoder" else ""
     told = kind.experiment + (f"; on a fixed base: {kind.on_fixed_base}" if kind.on_fixed_base else "")
-    return f"| `{kind.id}`{'*' * kind.whole} | {what} | {numbers} | {carried}{grows} | {told} |"
+    told = f"<br>*{told[0].upper()}{told[1:]}.*" if told else ""
+    return f"| `{kind.id}`{'*' * kind.whole}<br>{numbers}<br>{carried}{grows} | {what}{told} |"
 
 
 if __name__ == "__main__":
