@@ -95,7 +95,7 @@ def check_content(content: dict[str, Any], path: Path) -> dict[str, Any]:
 
 
 def check_once(path: Path = params.FILE) -> None:
-    """`check`, by the stage that comes first after the file was changed: a slip in the last section stops it.
+    """`check` of a file that has changed since it was checked last: a slip in the last section stops the first stage.
 
     Checking imports what all stages import, which takes seconds; a stage reads and checks its own section in any case.
 
@@ -104,17 +104,20 @@ def check_once(path: Path = params.FILE) -> None:
     """
     if not path.exists():
         return  # a stage that reads it says so
-    digest = hashlib.sha256(read_bytes(path)).hexdigest()
-    if CHECKED.is_file() and CHECKED.read_text(errors="replace") == digest:
-        return
+    if not CHECKED.is_file() or CHECKED.read_text(errors="replace") != _digest(path):
+        main(path)
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(read_bytes(path)).hexdigest()
+
+
+def main(path: Path = params.FILE) -> None:
+    """Check the params.yaml of this folder, and note that it was: the first stage need not check it again."""
+    digest = _digest(path)
     check(path)
     CHECKED.parent.mkdir(exist_ok=True)
     CHECKED.write_text(digest)
-
-
-def main() -> None:
-    """Check the params.yaml of this folder."""
-    check()
 
 
 if __name__ == "__main__":

@@ -139,3 +139,19 @@ def test_a_loop_without_rounds_is_one(tmp_path: Path):
 @pytest.mark.parametrize("clusters", ["[]", "[a, a]", "[a b]", "['../x']"])
 def test_clusters_have_distinct_plain_names(tmp_path: Path, clusters: str):
     assert "clusters: expected" in shape_error(tmp_path, f"clusters: {clusters}\nrounds: []\nfinal_round: 0\n")
+
+
+def test_a_file_that_was_checked_is_checked_again_only_when_it_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The loop checks the whole file while its servers start; its first stage need not do so again."""
+    monkeypatch.chdir(tmp_path)
+    file, checked = Path("params.yaml"), []
+    monkeypatch.setattr(sections, "check", lambda path: checked.append(path.read_text()))
+    file.write_text("a: 1\n")
+    sections.main()
+    sections.check_once()
+    file.write_text("a: 2\n")
+    sections.check_once()
+    sections.check_once()
+    assert checked == ["a: 1\n", "a: 2\n"]
