@@ -20,6 +20,8 @@ export PREFECT_SERVER_ANALYTICS_ENABLED := false
 export MLFLOW_DISABLE_TELEMETRY := true
 export DVC_NO_ANALYTICS := 1
 export HF_HUB_OFFLINE := 1
+# Images of Docker's often set it: each of the many processes would compile what changed since `make setup`.
+unexport PYTHONDONTWRITEBYTECODE
 # TORCH_INDEX: the address of PyTorch's index of CPU builds, where pip would otherwise fetch CUDA's (several GB). Its
 # builds have other hashes than those of the lock: torch, and torch alone, is then taken from there by its version.
 TORCH = $(shell sed -n 's/^\(torch==[^ ]*\) .*/\1/p' requirements-torch.lock)

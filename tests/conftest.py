@@ -2,6 +2,7 @@
 
 import gc
 import os
+import sys
 
 import pytest
 
@@ -18,8 +19,9 @@ for name, value in {
     "OMP_THREAD_LIMIT": "1",  # whatever a training asks torch for: threads that wait for each other spin meanwhile
 }.items():
     os.environ[name] = value
-for name in ("DVC_STAGE", "DVC_ROOT", "PREFECT_API_URL", "MLFLOW_TRACKING_URI"):
+for name in ("DVC_STAGE", "DVC_ROOT", "PREFECT_API_URL", "MLFLOW_TRACKING_URI", "PYTHONDONTWRITEBYTECODE"):
     os.environ.pop(name, None)
+sys.dont_write_bytecode = False  # else every process of pytest compiles all tests anew, and every stage its modules
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
