@@ -188,6 +188,7 @@ def import_(
     ] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
+    from bumblebee.diagnosis.dataset import refuse_unmatched
     from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
     from bumblebee.measured.importers import import_dataset, notes_of
     from bumblebee.report.wording import plural
@@ -195,7 +196,7 @@ def import_(
     refuse_overlap(dataset, [path for path in (source, model, columns, conditions) if path])
     refuse_existing(dataset)
     try_output(dataset)
-    ids = import_dataset(source, kind, dataset, model, columns, conditions, settings or ())
+    ids = import_dataset(source, kind, dataset, model, columns, conditions, settings or (), refuse_unmatched)
     print(f"{plural(len(ids), 'rollout')}: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
     print("\n".join(notes_of(dataset)))
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bumblebee.cli_model import by_joint
 from bumblebee.errors import BadInput, plain
 
 if TYPE_CHECKING:
@@ -53,8 +54,8 @@ def plan(
     config = PlanConfig(
         runs=runs, seconds=seconds, rate=rate, gains=_numbers("--gains", gains),
         damping=_numbers("--damping", damping) if damping else (), pool=pool, seed=seed, start=start,
-        speed=_by_joint("--speed", speed), torque=_by_joint("--torque", torque),
-        travel=_by_joint("--travel", travel), kp=kp, kd=kd,
+        speed=by_joint("--speed", speed), torque=by_joint("--torque", torque),
+        travel=by_joint("--travel", travel), kp=kp, kd=kd,
     )  # fmt: skip
     told = write_plan(_made(model, dataset, diagnosis, config), out, overwrite)
     print(plain(summary(told)))
@@ -97,15 +98,3 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise BadInput(option, "numbers with commas between them", repr(text)[:80]) from None
-
-
-def _by_joint(option: str, texts: list[str] | None) -> dict[str, float]:
-    """`elbow=2` or `2`, for all others."""
-    out: dict[str, float] = {}
-    for text in texts or ():
-        name, _, value = text.rpartition("=")
-        try:
-            out[name] = float(value)
-        except ValueError:
-            raise BadInput(option, "VALUE or JOINT=VALUE", repr(text)[:80]) from None
-    return out

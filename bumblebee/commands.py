@@ -43,6 +43,7 @@ TABLE: dict[str, tuple[Command, ...]] = {
     ),
     MEASURE: (
         Command("deploy", "bumblebee.cli_deploy:app", "Run a policy on a robot over a wire, or be a simulated robot."),
+        Command("model", "bumblebee.cli_model:app", "Make of a URDF a model that loads."),
         Command("import", "bumblebee.cli:import_", "Turn logs of a robot into a dataset."),
         Command("gap", "bumblebee.cli:gap", "Show where a model errs, before anything is fitted."),
         Command("diagnose", "bumblebee.cli:diagnose", "Find which effects the model lacks."),

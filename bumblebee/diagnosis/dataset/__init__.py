@@ -2,6 +2,7 @@
 
 from bumblebee.diagnosis.dataset.held_out import read_held_out, varied
 from bumblebee.diagnosis.dataset.informative_split import informative, window_errors
+from bumblebee.diagnosis.dataset.matched import refuse_unmatched
 from bumblebee.diagnosis.dataset.session import JUDGED_TWICE, Session, make_session, open_session
 from bumblebee.diagnosis.dataset.split import motion_names
 from bumblebee.diagnosis.dataset.time_steps import step_for, steps_of
@@ -14,6 +15,7 @@ __all__ = [
     "motion_names",
     "open_session",
     "read_held_out",
+    "refuse_unmatched",
     "step_for",
     "steps_of",
     "varied",

@@ -84,8 +84,12 @@ def import_dataset(
     column_map: Path | None = None,
     conditions: Path | None = None,
     settings: Sequence[str] = (),
+    require_match: Callable[[Path, Sequence[Rollout], object], None] | None = None,
 ) -> list[str]:
-    """Write `out`/rollouts/*.parquet and `out`/model.xml; `out` appears whole and must not exist. Returns the ids."""
+    """Write `out`/rollouts/*.parquet and `out`/model.xml; `out` appears whole and must not exist. Returns the ids.
+
+    `require_match(model, rollouts, where)` raises where the model that is written, called `where`, suits no rollout.
+    """
     out = Path(out)
     if os.path.lexists(out):
         raise BadInput(out, "a new folder", "one that exists", "Choose another name.")
@@ -98,6 +102,8 @@ def import_dataset(
         if model_path:
             locked = read_map(column_map, kind).locked if kind in MAPPED and column_map else ()
             copy_model(model_path, folder / "model.xml", locked)
+            if require_match:
+                require_match(folder / "model.xml", rollouts, model_path)
     return [rollout.rollout_id for rollout in rollouts]
 
 

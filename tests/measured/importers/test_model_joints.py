@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from bumblebee import cli
 from bumblebee.errors import BadInput
 from bumblebee.measured.importers import import_dataset, read_rollouts
 from bumblebee.measured.rollout import Rollout
@@ -97,3 +98,28 @@ def test_only_a_csv_may_lack_a_command(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(f"{PASSIVE}hz: 50\n")
     with pytest.raises(BadInput, match=r"columns: joint_target: expected names in the file, came '_'"):
         read_rollouts(tmp_path / "log.hdf5", "hdf5", mujoco.MjModel.from_xml_string(CART), tmp_path / "map.yaml")
+
+
+PAIR = "<tendon><fixed name='t'><joint joint='slider' coef='1'/></fixed></tendon>"
+UNLIKE = {
+    "no column for it": MAP.replace(", wrist", "").replace(", q", "").replace(", w", ""),
+    "one on a tendon": f"{MAP}angle_unit: [m, deg]\n",
+}
+
+
+@pytest.mark.parametrize("said", UNLIKE)
+def test_a_model_that_diagnose_would_refuse_is_refused_at_import_and_nothing_is_written(
+    said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = CART
+    if "tendon" in said:
+        model = model.replace("<actuator>", f"{PAIR}<actuator><motor tendon='t'/>")
+    for name, text in {"log.csv": ROWS, "map.yaml": UNLIKE[said], "model.xml": model}.items():
+        (tmp_path / name).write_text(text)
+    given = ["import", tmp_path / "log.csv", tmp_path / "set", "--kind", "csv", "--columns", tmp_path / "map.yaml"]
+    monkeypatch.setattr("sys.argv", ["bumblebee", *map(str, given), "--model", str(tmp_path / "model.xml")])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    line = capsys.readouterr().err
+    assert end.value.code == 2 and line.count("\n") == 1 and said in line
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["log.csv", "map.yaml", "model.xml"]
