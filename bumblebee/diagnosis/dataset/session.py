@@ -28,6 +28,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io.there import require_logs
 from bumblebee.measured.checks import beyond
 from bumblebee.measured.model_file import load_spec
+from bumblebee.measured.pauses import cut_at_pauses, cut_note
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
 from bumblebee.robot.drives import explicit_drives
@@ -87,7 +88,7 @@ def open_session(
     """
     require_logs(Path(model), Path(dataset))
     rules = thresholds or DatasetThresholds()
-    errors, reviewed = [], []
+    errors, reviewed, cut = [], [], []
     files = rollout_files(dataset)
     if not files:
         raise BadInput(Path(dataset) / "rollouts", "at least one *.parquet", "none")
@@ -99,9 +100,13 @@ def open_session(
         except BadInput as error:
             errors.append((file.stem, error))
             continue
-        reviewed.append((rollout, review(rollout, declared, file.name)))
-        if (refused := reviewed[-1][1].refused) is not None:
-            errors.append((file.stem, refused))
+        parts = cut_at_pauses(rollout)
+        whole = parts == [rollout]
+        cut += [(file.stem, parts)] * (not whole)
+        for part in parts:
+            reviewed.append((part, review(part, declared, file.name if whole else f"{part.rollout_id}.parquet")))
+            if (refused := reviewed[-1][1].refused) is not None:
+                errors.append((file.stem if whole else part.rollout_id, refused))
     wrong, doubts = wrong_conventions(reviewed, dataset, rules.conventions)
     if wrong is not None:
         raise wrong
@@ -110,7 +115,7 @@ def open_session(
         raise errors[0][1]
     lines = [line for _, one in reviewed for line in one.warnings if "rule gains" not in line]  # a note tells of gains
     session = make_session(spec, rollouts, model, dataset, errors, lines, rules)
-    session = replace(session, warnings=(*session.warnings, *doubts))
+    session = replace(session, warnings=(*session.warnings, *doubts), notes=[*cut_note(cut), *session.notes])
     return session if held_out is None else hold_out(session, held_out)
 
 

@@ -49,8 +49,6 @@ def _check_gaps(view: View, steps: np.ndarray, period: float) -> None:
     missing = float((steps[gaps] / period - 1).sum()) / len(steps)
     came = f"{int(gaps.sum())} gaps, the longest {longest:.4g} s = {longest / period:.1f} periods"
     fatal = longest > limits.gap_fatal * period or missing > limits.gap_share_fatal
-    if longest > limits.gap_fatal * period:
-        came += " (`episodes: split` in the import's map makes a rollout of what lies before, between and after)"
     row = int(np.argmax(steps)) + 1 if fatal else int(np.argmax(gaps)) + 1
     view.add("time", row, "time-gap", f"a row every {period:.4g} s", came, fatal=fatal)
 

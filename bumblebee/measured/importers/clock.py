@@ -1,15 +1,11 @@
 """Time stamps of a log as its map says: rows in order, takes told apart, and a rate that a control loop can have."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks import Thresholds
 from bumblebee.measured.importers.column_map import SECONDS, ColumnMap
+from bumblebee.measured.pauses import SHORTEST, parts_between, pauses
 
-SHORTEST = 1.0
-"""Seconds; a shorter part of a log is no rollout: it holds no window of the diagnosis' longest horizon."""
 SPLIT = "`episodes: split` in the map reads each as a rollout of its own"
 _SLOWEST, _FASTEST = 0.99, 2e4  # Hz; rows once a second tell nothing of a motion, and no bus of drives is faster
 _USUAL = (5.0, 5e3)  # Hz of logs; what another unit must lead to before it is named
@@ -33,13 +29,7 @@ def restarts(stamps: np.ndarray) -> list[int]:
 
 def takes(time: np.ndarray) -> list[slice]:
     """The rows of each take of (T,) stamps [s]: cut where time starts again, and at pauses that the checks refuse."""
-    with np.errstate(all="ignore"):
-        steps = np.diff(time)
-        forward = steps[steps > 0]
-        pauses = steps > Thresholds().gap_fatal * np.median(forward) if len(forward) else steps > np.inf
-    edges = sorted({0, *restarts(time), *(np.flatnonzero(pauses) + 1).tolist(), len(time)})
-    parts = [slice(first, last) for first, last in pairwise(edges)]
-    return [part for part in parts if part.stop - part.start > 1 and time[part.stop - 1] - time[part.start] >= SHORTEST]
+    return parts_between(time, [*restarts(time), *pauses(time)])
 
 
 def require_clock(where: str, time: np.ndarray, chosen: ColumnMap) -> None:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.importers.clock import SHORTEST
+from bumblebee.measured.pauses import SHORTEST
 
 LOCKED = "A motor that is absent, dead or locked has _ in its place in joints, and its joint stands under locked."
 _FOLDED = ("kp", "kd", "target_vel", "feed_forward")

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.importers.clock import SHORTEST, require_clock, takes
+from bumblebee.measured.importers.clock import require_clock, takes
 from bumblebee.measured.importers.column_map import ANGLE_FACTORS, LEFT_OUT, NAMED, ColumnMap
 from bumblebee.measured.importers.drive import Stretch, stretches
 from bumblebee.measured.importers.source import NO_VELOCITY, differences, measured_rate
+from bumblebee.measured.pauses import SHORTEST
 from bumblebee.measured.rollout import COMMANDS, WIDTHS, Rollout
 
 _ANGULAR = ("joint_pos", "joint_vel", "joint_target", "target_vel")

@@ -11,7 +11,7 @@ import mujoco
 
 from bumblebee.errors import BadInput
 from bumblebee.measured.urdf.mend import Stand, mend_inertias, mend_joints, weld
-from bumblebee.measured.urdf.tree import MOVING, numbers, read_robot
+from bumblebee.measured.urdf.tree import MOVING, number, read_robot
 
 DRIVES = ("position", "torque")
 
@@ -45,7 +45,7 @@ def from_urdf(path: Path, joints: Sequence[str], drives: Drives, stand: Stand | 
     robot = read_robot(path)
     _require_joints(path, robot, joints)
     _require_gains(joints, drives)
-    efforts = {str(one.get("name")): _effort(one) for one in robot.findall("joint")}
+    efforts = {str(one.get("name")): number(one.find("limit"), "effort") for one in robot.findall("joint")}
     notes = [*weld(robot, tuple(joints)), *mend_joints(robot), *mend_inertias(robot, stand or Stand())]
     spec = _compiled(path, robot)
     for geom in spec.geoms:
@@ -102,12 +102,6 @@ def _require_gains(joints: Sequence[str], drives: Drives) -> None:
             raise BadInput(option, "a gain of every position drive", f"none of {', '.join(absent)}"[:200], do)
         if wrong := [value for value in gains.values() if not (0 <= value < 1e9) or (option == "--kp" and value == 0)]:
             raise BadInput(option, f"gains {least}", f"{wrong[0]:g}")
-
-
-def _effort(joint: Element) -> float:
-    limit = joint.find("limit")
-    found = numbers(limit, "effort") if limit is not None else ()
-    return float(found[0]) if len(found) else 0.0
 
 
 def _drive(spec: mujoco.MjSpec, name: str, drives: Drives, effort: float) -> None:

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element, SubElement
 import mujoco
 import numpy as np
 
-from bumblebee.measured.urdf.tree import MOVING, ends, numbers
+from bumblebee.measured.urdf.tree import MOVING, ends, number
 
 _KEYS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
@@ -41,12 +41,12 @@ def mend_joints(robot: Element) -> list[str]:
         if joint.get("type") not in MOVING:
             continue
         limit, dynamics = joint.find("limit"), joint.find("dynamics")
-        lower, upper = (_number(limit, key) for key in ("lower", "upper"))
+        lower, upper = (number(limit, key) for key in ("lower", "upper"))
         if limit is not None and lower >= upper and joint.get("type") != "continuous":
             limit.attrib = {key: value for key, value in limit.attrib.items() if key == "effort"}
             notes.append(f"joint {joint.get('name')}: range {lower:g} to {upper:g} left out: it has no width")
         for key in ("damping", "friction"):
-            if dynamics is not None and (value := _number(dynamics, key)) < 0:
+            if dynamics is not None and (value := number(dynamics, key)) < 0:
                 dynamics.set(key, "0")
                 notes.append(f"joint {joint.get('name')}: {key} {value:g} is negative: 0")
     return notes
@@ -119,18 +119,12 @@ def _ball(mass: float, stand: Stand) -> np.ndarray:
 
 
 def _mass(link: Element) -> float:
-    return _number(link.find("inertial/mass"), "value")
+    return number(link.find("inertial/mass"), "value")
 
 
 def _tensor(inertia: Element | None) -> np.ndarray:
-    xx, yy, zz, xy, xz, yz = (_number(inertia, key) for key in _KEYS)
+    xx, yy, zz, xy, xz, yz = (number(inertia, key) for key in _KEYS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _number(element: Element | None, key: str) -> float:
-    """The first number of an attribute; 0 where it or its element is missing, as URDF has it."""
-    found = numbers(element, key) if element is not None else np.zeros(0)
-    return float(found[0]) if found.size else 0.0
 
 
 def _words(sizes: np.ndarray) -> str:

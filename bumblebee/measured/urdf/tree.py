@@ -124,6 +124,12 @@ def numbers(element: Element, key: str) -> np.ndarray:
     return np.array([float(part) for part in element.get(key, "").split()])
 
 
+def number(element: Element | None, key: str) -> float:
+    """The first number of an attribute; 0 where it or its element is missing, as URDF has it."""
+    found = numbers(element, key) if element is not None else np.zeros(0)
+    return float(found[0]) if found.size else 0.0
+
+
 def _require_tree(path: Path, robot: Element) -> None:
     """Refuse names that stand twice, joints between links that are not there, loops and loose parts."""
     links, joints = [one.get("name") for one in robot.findall("link")], robot.findall("joint")

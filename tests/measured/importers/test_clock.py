@@ -52,14 +52,14 @@ def test_usual_rates_pass(tmp_path: Path, stamps: np.ndarray, unit: str) -> None
     assert len(read(tmp_path, stamps, unit)) == 1
 
 
-@pytest.mark.parametrize(("pause", "named"), [(10.0, True), (0.5, True), (0.06, False)])
-def test_a_pause_names_episodes_as_the_remedy(pause: float, named: bool) -> None:
+@pytest.mark.parametrize(("pause", "fatal"), [(10.0, True), (0.5, True), (0.06, False)])
+def test_a_long_pause_is_fatal_to_a_rollout_that_nobody_cuts(pause: float, fatal: bool) -> None:
     rollout = arm_rollout(0)
     late = np.where(np.arange(rollout.frames) < 100, 0.0, pause)
     (found,) = (
         f for f in check_rollout(replace(rollout, time=rollout.time + late), arm_model()) if f.rule == "time-gap"
     )
-    assert found.fatal == named and ("`episodes: split`" in found.came) == named
+    assert found.fatal == fatal
 
 
 def test_cells_without_a_number_name_the_setting_that_leaves_rows_out() -> None:
