@@ -12,10 +12,11 @@ from bumblebee.diagnosis.dataset.declared_contacts import without_contradicted
 from bumblebee.diagnosis.dataset.held_out import HeldOut, condition_notes, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.own_step import agreed_steps
+from bumblebee.diagnosis.dataset.recordings import read_recordings
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.dataset.split import accepting, accepting_across, motion_names, split
 from bumblebee.diagnosis.dataset.undriven import undriven_warnings
-from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
+from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages, with_known_velocities
 from bumblebee.diagnosis.simulation import (
     Layout,
     Plant,
@@ -28,8 +29,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io.there import require_logs
 from bumblebee.measured.checks import beyond
 from bumblebee.measured.model_file import load_spec
-from bumblebee.measured.pauses import cut_at_pauses, cut_note
-from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
+from bumblebee.measured.rollout import Rollout, rollout_files
 from bumblebee.measured.usable import review
 from bumblebee.robot.drives import explicit_drives
 
@@ -88,25 +88,15 @@ def open_session(
     """
     require_logs(Path(model), Path(dataset))
     rules = thresholds or DatasetThresholds()
-    errors, reviewed, cut = [], [], []
     files = rollout_files(dataset)
     if not files:
         raise BadInput(Path(dataset) / "rollouts", "at least one *.parquet", "none")
     spec = load_spec(model)
     declared = explicit_drives(spec)[0].compile()
-    for file in files:
-        try:
-            rollout = read_rollout(file)
-        except BadInput as error:
-            errors.append((file.stem, error))
-            continue
-        parts = cut_at_pauses(rollout)
-        whole = parts == [rollout]
-        cut += [(file.stem, parts)] * (not whole)
-        for part in parts:
-            reviewed.append((part, review(part, declared, file.name if whole else f"{part.rollout_id}.parquet")))
-            if (refused := reviewed[-1][1].refused) is not None:
-                errors.append((file.stem if whole else part.rollout_id, refused))
+    read = read_recordings(files, declared, rules.velocity_latency)
+    judged = [(name, rollout, review(rollout, declared, name)) for name, rollout in read.named]
+    errors = [*read.errors, *((Path(name).stem, one.refused) for name, _, one in judged if one.refused is not None)]
+    reviewed = [(rollout, one) for _, rollout, one in judged]
     wrong, doubts = wrong_conventions(reviewed, dataset, rules.conventions)
     if wrong is not None:
         raise wrong
@@ -115,7 +105,7 @@ def open_session(
         raise errors[0][1]
     lines = [line for _, one in reviewed for line in one.warnings if "rule gains" not in line]  # a note tells of gains
     session = make_session(spec, rollouts, model, dataset, errors, lines, rules)
-    session = replace(session, warnings=(*session.warnings, *doubts), notes=[*cut_note(cut), *session.notes])
+    session = replace(session, warnings=(*session.warnings, *doubts), notes=[*read.notes, *session.notes])
     return session if held_out is None else hold_out(session, held_out)
 
 
@@ -143,6 +133,9 @@ def make_session(
     undriven = undriven_warnings(plant, long, model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
+    old: list[str] = []
+    if not plant.floating:
+        long, old = with_known_velocities(long, rules.velocity_latency)
     sigma = estimate_noise(long, layout, rules.noise)
     spec, contradicted, contact_notes = without_contradicted(spec, plant, layout, long, sigma, rules.contacts)
     if contradicted:
@@ -154,6 +147,7 @@ def make_session(
         condition_notes(plant, long, rules.conditions)
         + drive_notes
         + contact_notes
+        + old
         + [NO_HEIGHT] * (plant.floating and not has_pos)
         + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
     )

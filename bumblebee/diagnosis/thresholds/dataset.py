@@ -156,15 +156,13 @@ class VelocityLatency:
     doubt: float = 4.0
     """Standard errors that make it beyond doubt."""
     most: float = 0.05
-    """Age at most [s]; more is no reading's age."""
+    """Age of a reading at most [s]; older velocities are not used."""
+    sought: float = 0.3
+    """Age up to which velocities are compared with the positions [s]."""
     rounds: int = 3
     """Rounds, each with the velocities moved by what was found before."""
     parts: int = 6
     """Parts of a rollout, which the standard errors take for independent."""
-    enough: int = 12
-    """Parts in all, below which nothing is said."""
-    gap: float = 1.3
-    """Times its usual length that a span may have: in a longer one the log has a gap."""
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,18 @@
 """Velocities that are logged late: their age is found on each joint, and none is found where they are in step."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.dataset.session import make_session
-from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
+from bumblebee.diagnosis.dataset.session import make_session, open_session
+from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages, with_known_velocities
 from bumblebee.diagnosis.replay import replay as errors
 from bumblebee.diagnosis.thresholds.dataset import VelocityLatency
-from bumblebee.measured.rollout import Rollout
-from tests.diagnosis import cart
+from bumblebee.measured.rollout import Rollout, write_rollout
+from tests.diagnosis import arm, cart
 
 RULE = VelocityLatency()
 FREQUENCIES = np.array([0.4, 0.9, 1.7])
@@ -56,6 +57,44 @@ def test_velocities_in_step_stay_as_logged() -> None:
     assert not velocity_ages(logs, RULE).any()
     assert in_step(logs[0], velocity_ages(logs, RULE)) is logs[0]
     assert age_note(logs[0].joints, np.zeros(2)) == ""
+
+
+@pytest.mark.parametrize("age", [0.07, 0.18, 0.29])
+@pytest.mark.parametrize("count", [1, 3])
+def test_velocities_too_old_to_be_read_at_once_are_replaced_by_differences_of_the_positions(
+    age: float, count: int
+) -> None:
+    logs = [log(seed, 100.0, (age, 0.0)) for seed in range(count)]
+    found = velocity_ages(logs, RULE)
+    np.testing.assert_allclose(found, (age, 0.0), atol=1e-3)
+    made, (note,) = with_known_velocities(logs, RULE)
+    np.testing.assert_allclose(made[0].joint_vel[:, 0], np.gradient(logs[0].joint_pos[:, 0], logs[0].time))
+    np.testing.assert_array_equal(made[0].joint_vel[:, 1], logs[0].joint_vel[:, 1])
+    assert f"too old to be used; differences of the positions take their place: j0 {1e3 * age:.0f}" in note
+
+
+def test_a_right_model_with_velocities_of_180_ms_comes_near_the_noise() -> None:
+    logs = cart.record(count=3, hz=250.0, seconds=6.0)
+    old = [replace(one, joint_vel=_delayed(one, 0.18)) for one in logs]
+    made = make_session(mujoco.MjSpec.from_string(cart.xml()), old, "cart", "memory")
+    assert any("too old to be used" in note and "cart 180" in note for note in made.notes)
+    assert errors(made, budget=20)["0.2"]["joint_pos_rmse"]["value"] < 0.01  # 0.57 with the velocities as logged
+
+
+def test_no_check_judges_by_velocities_that_are_too_old(tmp_path: Path) -> None:
+    """With velocities of another time the response seems to oppose the command, and the recording is set aside."""
+    logs = arm.simulate({}, count=4, seconds=6.0, seed=2)
+    for one in logs:
+        old = replace(one, joint_vel=_delayed(one, 0.18))
+        write_rollout(tmp_path / "set" / "rollouts" / f"{one.rollout_id}.parquet", old)
+    (tmp_path / "model.xml").write_text(arm.XML)
+    session = open_session(tmp_path / "model.xml", tmp_path / "set")
+    assert len(session.rollouts) == 4
+    assert sum("too old to be used" in note for note in session.notes) == 1
+
+
+def _delayed(one: Rollout, age: float) -> np.ndarray:
+    return np.stack([np.interp(one.time - age, one.time, v) for v in one.joint_vel.T], axis=1)
 
 
 @pytest.mark.parametrize("step", [0.0005, 0.001])
