@@ -35,6 +35,11 @@ class HeldOut:
         listed = ", ".join(map(_said, self.values))
         return f"held out are rollouts with {self.name} = {listed}: they took no part in the fit or in acceptance"
 
+    def lost_notes(self, lost: Sequence[tuple[Rollout, str]]) -> list[str]:
+        """A note on rollouts that were to be held out and were set aside, with their reasons."""
+        listed = [f"{r.rollout_id} ({self.name} = {_said(v)})" for r, _ in lost if (v := self.of(r)) is not None]
+        return [f"to be held out, but set aside: {', '.join(listed)}"] * bool(listed)
+
     def of(self, rollout: Rollout) -> Value | None:
         """A rollout's value of the condition."""
         return stated_conditions(rollout.meta, rollout.joints).get(self.name)
@@ -59,18 +64,29 @@ def read_held_out(text: str) -> HeldOut:
     return HeldOut(name, tuple(map(_value, values)))
 
 
-def split_by(rollouts: Sequence[Rollout], held: HeldOut) -> tuple[list[int], list[int]]:
-    """Indices to fit and to hold out; `BadInput` where the condition parts the rollouts in no two sets."""
+def split_by(
+    rollouts: Sequence[Rollout], held: HeldOut, lost: Sequence[tuple[Rollout, str]] = ()
+) -> tuple[list[int], list[int]]:
+    """Indices to fit and to hold out; `lost` are rollouts to hold out that were set aside, with the reason of each.
+
+    Raises:
+        BadInput: the condition parts the rollouts in no two sets.
+    """
     stated = [stated_conditions(r.meta, r.joints) for r in rollouts]
     if not any(held.name in one for one in stated):
         names = sorted({name for one in stated for name in one})
         raise BadInput(_OPTION, f"a condition that the rollouts state ({', '.join(names[:12]) or 'none'})", held.name)
     known = _sorted({one[held.name] for one in stated if held.name in one})
     for value in held.values:
-        if not any(held.same(value, own) for own in known):
+        if any(held.same(value, own) for own in known):
+            continue
+        aside = [why for r, why in lost if (own := held.of(r)) is not None and held.same(value, own)]
+        if not aside:
             listed = ", ".join(_said(own) for own in known[:12])
             raise BadInput(f"{_OPTION} {held.name}", f"values that rollouts have ({listed})", _said(value))
     away = [i for i, one in enumerate(stated) if held.matches(one.get(held.name))]
+    if not away:
+        raise BadInput(f"{_OPTION} {held.name}", "rollouts that can be used", f"{len(lost)} set aside: {lost[0][1]}")
     if len(away) == len(rollouts):
         raise BadInput(f"{_OPTION} {held.name}", "at least one rollout to fit", "all rollouts held out")
     return [i for i in range(len(rollouts)) if i not in away], away

@@ -15,6 +15,7 @@ from bumblebee.diagnosis.dataset.own_step import agreed_steps
 from bumblebee.diagnosis.dataset.recordings import read_recordings
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.dataset.split import accepting, accepting_across, motion_names, split
+from bumblebee.diagnosis.dataset.told_once import told_once
 from bumblebee.diagnosis.dataset.undriven import undriven_warnings
 from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages, with_known_velocities
 from bumblebee.diagnosis.simulation import (
@@ -106,7 +107,7 @@ def open_session(
     lines = [line for _, one in reviewed for line in one.warnings if "rule gains" not in line]  # a note tells of gains
     session = make_session(spec, rollouts, model, dataset, errors, lines, rules)
     session = replace(session, warnings=(*session.warnings, *doubts), notes=[*read.notes, *session.notes])
-    return session if held_out is None else hold_out(session, held_out)
+    return session if held_out is None else hold_out(session, held_out, [rollout for _, rollout in read.named])
 
 
 def make_session(
@@ -142,7 +143,8 @@ def make_session(
         plant, _ = make_plants(spec, long, model)
     train, holdout = split(long, rules.split)
     accept = accepting(long, train, holdout, rules.split)
-    notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
+    notes = [f"set aside: {line}" for line in told_once([str(error) for _, error in failed])]
+    notes += [f"check: {line}" for line in told_once(warnings)]
     notes += (
         condition_notes(plant, long, rules.conditions)
         + drive_notes
@@ -164,14 +166,19 @@ def make_session(
     )
 
 
-def hold_out(session: Session, held_out: HeldOut) -> Session:
-    """The session with the rollouts of some conditions held out; those that are left decide on acceptance, too."""
-    train, holdout = split_by(session.rollouts, held_out)
+def hold_out(session: Session, held_out: HeldOut, read: Sequence[Rollout] = ()) -> Session:
+    """The session with the rollouts of some conditions held out; those that are left decide on acceptance, too.
+
+    Of rollouts that were `read` and set aside, those that were to be held out are named.
+    """
+    reasons = {one["rollout"]: one["reason"] for one in session.set_aside}
+    lost = [(r, reasons[r.rollout_id]) for r in read if r.rollout_id in reasons and held_out.matches(held_out.of(r))]
+    train, holdout = split_by(session.rollouts, held_out, lost)
     fitted = [session.rollouts[i] for i in train]
     stated = [(session.plant.under.get(r.rollout_id, 0), held_out.of(r)) for r in fitted]
     rule = session.thresholds.split
     accept = [train[k] for k in accepting_across(motion_names(fitted, rule), stated, rule)]
-    notes = [held_out.note(), *(note for note in session.notes if note != JUDGED_TWICE)]
+    notes = [held_out.note(), *held_out.lost_notes(lost), *(note for note in session.notes if note != JUDGED_TWICE)]
     return replace(session, train=train, holdout=holdout, accept=accept, notes=notes, held_out=held_out)
 
 
@@ -190,12 +197,6 @@ def _sorted_out(
     if not long:
         raise failed[0][1]
     return long, failed
-
-
-def _check_notes(warnings: Sequence[str], most: int) -> list[str]:
-    """Notes of the checks that do not stop a file; of more than `most` findings the number."""
-    notes = [f"check: {text}" for text in warnings[:most]]
-    return [*notes, f"{len(warnings) - most} more findings that do not stop a file"] if len(warnings) > most else notes
 
 
 def _refined(

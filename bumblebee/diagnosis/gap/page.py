@@ -15,6 +15,7 @@ from bumblebee.diagnosis.report import (
     number,
     probability,
     shade,
+    share_of,
     table,
     warning,
 )
@@ -122,7 +123,7 @@ def _torque(report: Gap) -> str:
     rows = []
     for joint, entry in lacking.items():
         on = escape(", ".join(entry["depends_on"])) or "no single quantity"
-        share = f"{100 * entry['structured_rms'] / entry['drive_rms']:.0f} %" if entry["drive_rms"] else "-"
+        share = share_of(entry["structured_rms"], entry["drive_rms"])
         quiet = f"<span class='note'>{escape(nothing_seen(document, joint, report.thresholds.report.verdicts))}</span>"
         rows.append(
             [

@@ -13,6 +13,7 @@ from bumblebee.diagnosis.report.html import (
     number,
     probability,
     shade,
+    share_of,
     table,
     warning,
 )
@@ -59,6 +60,7 @@ __all__ = [
     "probability",
     "render_report",
     "shade",
+    "share_of",
     "shares_left_out",
     "summary",
     "surface_notes",

@@ -12,6 +12,7 @@ from scipy.stats import norm
 
 from bumblebee.diagnosis.candidates import Formula
 from bumblebee.diagnosis.discrepancy import BasisFunction, Discovery, JointLackOfFit, quantities_of
+from bumblebee.diagnosis.report.html import share_of
 from bumblebee.diagnosis.report.what_matters import LEFT
 from bumblebee.diagnosis.simulation import joint_units
 from bumblebee.diagnosis.thresholds.report import MeasuredCurve, ReportThresholds
@@ -81,10 +82,10 @@ def _described(left: Sequence[JointLackOfFit], found: Discovery, rules: ReportTh
         on = _cut(_depends_on(j, forms), rules.matters.quantities) or "no single quantity"
         line = f"{j.joint}: residual torque depends on {on}"
         if j.functions:
-            share = 100 * j.rms / max(j.typical, 1e-12)
+            share = share_of(j.rms, max(j.typical, 1e-12), "its drive's")
             unit = units[j.joint]["torque"]
             what = "force" if unit == "N" else "torque"
-            line = f"{j.joint}: a {what} of {j.rms:.2g} {unit} RMS ({share:.0f} % of its drive's) depends on {on}"
+            line = f"{j.joint}: a {what} of {j.rms:.2g} {unit} RMS ({share}) depends on {on}"
         if j.joint in forms:
             terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
             terms = TABLE.sub(r"curve(\1, ...)", terms)  # its points are for diagnosis.json

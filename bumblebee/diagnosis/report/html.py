@@ -88,6 +88,14 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:,.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
 
 
+def share_of(part: float, whole: float, what: str = "") -> str:
+    """A size as a share of another, called `what`; as a multiple where it is the larger one."""
+    if not whole:
+        return "-"
+    text = f"{100 * part / whole:.0f} %" if part <= whole else f"{number(part / whole, 2)} times"
+    return f"{text}{' of' if part <= whole else ''} {what}" if what else text
+
+
 def probability(p: float) -> str:
     """A p value; below 1e-12 nobody's model of noise is that good."""
     return "&lt; 1e-12" if p < 1e-12 else f"{p:.1g}"

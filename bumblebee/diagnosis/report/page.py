@@ -15,6 +15,7 @@ from bumblebee.diagnosis.report.html import (
     items,
     number,
     probability,
+    share_of,
     table,
     warning,
 )
@@ -186,7 +187,7 @@ def _left(document: dict[str, Any], rules: ReportThresholds) -> str:
         [
             escape(joint),
             f"{e['torque_rms']:.3g} {of_joint(document, joint, 'torque')}",
-            f"{100 * e['torque_rms'] / e['typical_torque']:.0f} %",
+            share_of(e["torque_rms"], e["typical_torque"]),
             escape(", ".join(e["depends_on"])) or "-",
             probability(e["p"]),
         ]

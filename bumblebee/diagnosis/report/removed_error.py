@@ -73,7 +73,7 @@ def _share(
     out: dict[str, Any] = {"before": float(before), "after": float(after), "floor": floor, "share": None, "ci95": None}
     if floor is None or before <= least * floor:
         return out
-    out["share"] = float((before - after) / (before - floor))
+    out["share"] = min(float((before - after) / (before - floor)), 1.0)  # below the floor is at it
     if len(names) < 2:
         return out
     draws = np.random.default_rng(seed).integers(0, len(names), size=(resamples, len(names)))
@@ -82,7 +82,7 @@ def _share(
     if fair.sum() > resamples // 2:
         shares = (each[0] - each[1])[fair] / (each[0] - floor)[fair]
         low, high = widened(out["share"], np.quantile(shares, [0.025, 0.975]), len(names))
-        out["ci95"] = [low, min(high, 1.0) if out["share"] <= 1 else high]
+        out["ci95"] = [min(low, 1.0), min(high, 1.0)]
     return out
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import short_term
 from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
+from bumblebee.diagnosis.report.html import share_of
 from bumblebee.diagnosis.report.left_out import lost_without, shares_words
 from bumblebee.diagnosis.report.notes import early_first, nothing_seen, what_is_left, worse_horizons
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, rows
@@ -165,9 +166,9 @@ def missing_lines(document: dict[str, Any], rule: Verdicts) -> list[str]:
     lines = []
     for joint, e in lacking.items():
         if e["significant"]:
-            share = 100 * e["structured_rms"] / e["drive_rms"]
+            share = share_of(e["structured_rms"], e["drive_rms"], "its drive torque")
             on = ", ".join(e["depends_on"]) or "no single quantity"
-            size = f"{e['structured_rms']:.3g} {e['unit']} RMS ({share:.0f} % of its drive torque)"
+            size = f"{e['structured_rms']:.3g} {e['unit']} RMS ({share})"
             lines.append(f"  {joint:<28} {size}, depends on {on}")
         else:
             lines.append(f"  {joint:<28} {nothing_seen(document, joint, rule)} (p = {e['p']:.2g})")

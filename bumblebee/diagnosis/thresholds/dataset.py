@@ -11,8 +11,6 @@ class Usable:
     """Length at least [s]: shorter ones hold no window of 0.2 s after the lead that delayed commands need."""
     rows: int = 12
     """Rows at least."""
-    warnings: int = 12
-    """Findings of the checks that are listed one by one; of more their number is said."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from bumblebee.measured.checks.target_scale import check_target_scale
 from bumblebee.measured.checks.thresholds import Thresholds
 from bumblebee.measured.checks.time import check_time
 from bumblebee.measured.checks.units import check_degrees, check_gains
-from bumblebee.measured.checks.values import check_finite, check_frozen, check_range, check_steps
+from bumblebee.measured.checks.values import check_finite, check_frozen, check_range, check_silent, check_steps
 from bumblebee.measured.checks.view import View
 from bumblebee.measured.rollout import Rollout
 
@@ -68,6 +68,7 @@ def _check_all(view: View) -> None:
     check_target_scale(view)
     check_degrees(view)
     check_frozen(view)
+    check_silent(view)
     check_range(view)
     check_velocity(view)
     check_steps(view)

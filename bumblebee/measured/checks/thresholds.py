@@ -38,6 +38,8 @@ class Thresholds:
     freeze_share: float = 0.25
     """Share of the file: a shorter standstill of a coarse encoder that moves again may be a stalled joint (a real
     gripper stood still for 6 s against its torque limit), a longer one is a dead channel."""
+    silent_share: float = 0.9
+    """Share of the rows in which a joint moves that its torque may be exactly 0: a reading never is twice in a row."""
     step_speed: float = 8.0
     """Speed [rad/s] that may hide between two rows without showing in joint_vel (impacts in falls)."""
     step_floor: float = 0.08

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from bumblebee.measured.checks.units import driven_joints
 from bumblebee.measured.checks.view import View, integral
 from bumblebee.measured.rollout import Rollout
 
@@ -153,6 +154,24 @@ def _check_frozen_rate(view: View, joint: int, need: int) -> None:
         never = length + 1 == rollout.frames
         expected = "a reading that follows" + " (or no joint_vel: an import makes it from joint_pos)" * never
         view.add(view.label("joint_vel", joint), start, "frozen", expected, came, fatal=True)
+
+
+def check_silent(view: View) -> None:
+    """Torques that are exactly 0 nearly always while their joint moves: told, since a free joint has none."""
+    rollout, limits = view.rollout, view.limits
+    driven = set(driven_joints(view.model))
+    moves = np.abs(rollout.joint_vel) > limits.moving_speed
+    for column in ("joint_torque", "joint_torque_cmd"):
+        values = getattr(rollout, column)
+        for joint, name in enumerate(rollout.joints) if values is not None else ():
+            rows = moves[:, joint]
+            if name not in driven or rows.sum() < view.lasting:
+                continue
+            silent = float((values[rows, joint] == 0).mean())
+            if silent >= limits.silent_share:
+                came = f"0 in {100 * silent:.0f} % of them"
+                expected = "a torque in the rows in which the joint moves"
+                view.add(view.label(column, joint), None, "silent", expected, came, fatal=False)
 
 
 def _check_frozen_base(view: View, need: int) -> None:

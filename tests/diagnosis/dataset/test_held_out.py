@@ -1,13 +1,17 @@
 """Rollouts held out by a condition take no part; what is asked for and not there is named."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
 from bumblebee.diagnosis.dataset.held_out import read_held_out, split_by, varied
 from bumblebee.diagnosis.dataset.informative_split import informative
-from bumblebee.diagnosis.dataset.session import hold_out
+from bumblebee.diagnosis.dataset.session import hold_out, open_session
 from bumblebee.diagnosis.dataset.split import accepting_across
 from bumblebee.diagnosis.thresholds.dataset import Split
 from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import write_rollout
 from tests.diagnosis import servo_at_gains as servo
 from tests.diagnosis.arm import session_of
 from tests.diagnosis.servo_at_gains import Setting
@@ -51,6 +55,22 @@ def test_what_cannot_be_held_out_is_said_in_one_line(text: str, says: str) -> No
     with pytest.raises(BadInput, match=says) as error:
         split_by(rollouts, read_held_out(text))
     assert "\n" not in str(error.value)
+
+
+def test_rollouts_to_hold_out_that_were_set_aside_are_named(tmp_path: Path) -> None:
+    """Of a value all of whose rollouts were set aside a note is left; of all values nothing can be held out."""
+    for k, rollout in enumerate(servo.record(THREE, each=1)):
+        steady = (
+            rollout.joint_pos if rollout.meta["kp"] != [2.5] else rollout.joint_pos + 5.0 * (rollout.time > 1)[:, None]
+        )
+        made = replace(rollout, rollout_id=f"log{k}", joint_pos=steady)
+        write_rollout(tmp_path / "set" / "rollouts" / f"log{k}.parquet", made)
+    (tmp_path / "model.xml").write_text(servo.xml())
+    session = open_session(tmp_path / "model.xml", tmp_path / "set", held_out=read_held_out("kp=0.4,2.5"))
+    assert [r.rollout_id for r in session.rollouts] == ["log0", "log1"] and session.holdout == [0]
+    assert "to be held out, but set aside: log2 (kp = 2.5)" in session.notes
+    with pytest.raises(BadInput, match=r"--hold-out kp: expected rollouts that can be used, came 1 set aside: log2"):
+        open_session(tmp_path / "model.xml", tmp_path / "set", held_out=read_held_out("kp=2.5"))
 
 
 def test_numbers_match_but_for_rounding_and_texts_to_the_letter() -> None:
