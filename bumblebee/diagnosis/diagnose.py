@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.comparison import Holdout, standing
+from bumblebee.diagnosis.comparison import Holdout, standing, withdrawn
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.discrepancy import (
@@ -26,6 +26,7 @@ from bumblebee.diagnosis.report import (
     Findings,
     document,
     effect_entries,
+    gain_of,
     law_notes,
     loss_entries,
     shares_left_out,
@@ -109,23 +110,28 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
         found, entries = _nothing(material, found), []
     effects = [*effects, *steps, *losses]
     entries = [*entries, *(rounded if steps else []), *lost]
-    if found.beyond is not None:
-        notes = [
-            *(
-                f"replaced by a discrepancy model or effect that explains more: {name}"
-                for name in found.beyond.withdrawn
-            ),
-            *notes,
-        ]
+    told = _told(material, config, found, Findings(effects, entries, notes))
+    if effects and gain_of(told, config.thresholds.report).harms:
+        where = "held-out rollouts" if material.session.holdout else "fitted rollout"
+        found, notes = _nothing(material, found), [*notes, withdrawn(effects, where)]
+        effects = []
+        told = _told(material, config, found, Findings([], [], notes))
+    return Diagnosis(told, effects, material.session, found.search, found.last.problem)
+
+
+def _told(material: Material, config: DiagnosisConfig, found: _Found, findings: Findings) -> dict[str, Any]:
+    """The document of what stands, with the notes on how it was found."""
+    gone = [] if found.beyond is None else found.beyond.withdrawn
     notes = [
-        *notes,
+        *(f"replaced by a discrepancy model or effect that explains more: {name}" for name in gone),
+        *findings.notes,
         *law_notes(found.last),
         *(n for b in found.budgets for n in b.notes()),
-        *surface_notes(material.session, effects, config.thresholds.report.verdicts),
-        *unseen_notes(material.session, effects, config.horizon, config.thresholds.report.verdicts),
+        *surface_notes(material.session, findings.effects, config.thresholds.report.verdicts),
+        *unseen_notes(material.session, findings.effects, config.horizon, config.thresholds.report.verdicts),
     ]
-    told = document(material, config, found.search, found.last, found.beyond, Findings(effects, entries, notes))
-    return Diagnosis(told, effects, material.session, found.search, found.last.problem)
+    whole = Findings(findings.effects, findings.entries, notes)
+    return document(material, config, found.search, found.last, found.beyond, whole)
 
 
 def _found(

@@ -23,7 +23,7 @@ from bumblebee.diagnosis.comparison.submodel import (
     simulated_without,
 )
 from bumblebee.diagnosis.comparison.wald import Step, costs_more_than, evidence, wald, walds, z_value, z_values
-from bumblebee.diagnosis.comparison.withdrawal import standing
+from bumblebee.diagnosis.comparison.withdrawal import standing, withdrawn
 
 __all__ = [
     "Holdout",
@@ -54,6 +54,7 @@ __all__ = [
     "standing",
     "wald",
     "walds",
+    "withdrawn",
     "z_value",
     "z_values",
 ]

@@ -2,6 +2,9 @@
 
 Each effect had to pay there when it was accepted, but not all of what stands in the end is judged so: steps of encoders
 are read off the logs, a last fit moves every value. A correction that makes things worse is withdrawn, with a note.
+Here windows of 0.2 s are judged in units of their noise, in logarithms, so that a few that went far astray count
+little; the error in radians after 1 s, which is reported, can be larger all the same. So what is surely worse there at
+some horizon and surely better at none is withdrawn too (`GainByHorizon.harms`).
 """
 
 from collections.abc import Sequence
@@ -37,14 +40,15 @@ def standing(
     """
     fitted, read, notes = list(fitted), list(read), []
     if read and is_worse(problem, fitted, [*fitted, *read]):
-        notes.append(_note(read))
+        notes.append(withdrawn(read, "validation windows"))
         read = []
     if fitted and is_worse(problem, read, [*fitted, *read]):
-        notes.append(_note(fitted))
+        notes.append(withdrawn(fitted, "validation windows"))
         fitted = []
     return fitted, read, notes
 
 
-def _note(effects: Sequence[Effect]) -> str:
+def withdrawn(effects: Sequence[Effect], where: str) -> str:
+    """Note on effects that do not stand, for the error with them is larger on windows called `where`."""
     names = ", ".join(f"{e.effect} on {', '.join(e.where) or 'the whole robot'}" for e in effects)
-    return f"withdrawn, for its error on the validation windows was larger: {names}"
+    return f"withdrawn, for its error on the {where} was larger: {names}"

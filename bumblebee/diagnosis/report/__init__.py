@@ -3,6 +3,7 @@
 from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
+from bumblebee.diagnosis.report.gain_by_horizon import gain_of
 from bumblebee.diagnosis.report.html import (
     NO_INLAY,
     Inlay,
@@ -45,6 +46,7 @@ __all__ = [
     "examples",
     "figure",
     "floor_block",
+    "gain_of",
     "gap_summary",
     "horizon_whiteners",
     "horizon_windows",

@@ -18,7 +18,7 @@ from bumblebee.diagnosis.report.prediction_error import (
     window_residuals,
 )
 from bumblebee.diagnosis.report.removed_error import Ends
-from bumblebee.diagnosis.report.what_matters import what_matters
+from bumblebee.diagnosis.report.what_matters import bound_warnings, what_matters
 from bumblebee.diagnosis.residuals import NAMES
 from bumblebee.diagnosis.selection import Refined, Search, detectable
 from bumblebee.diagnosis.simulation import joint_units, mixed_notes, vary
@@ -68,7 +68,14 @@ def document(
     )
     lone = [] if session.holdout else [LONE]
     told["summary"] = what_matters(told, ends, rules.matters, config.seed)
-    return told | {"warnings": [*session.warnings, *lone, *unexplained_error(told, rules.verdicts)]}
+    return told | {
+        "warnings": [
+            *session.warnings,
+            *lone,
+            *bound_warnings(findings.entries),
+            *unexplained_error(told, rules.verdicts),
+        ]
+    }
 
 
 def _recorded_under(session: Session) -> dict[str, Any]:

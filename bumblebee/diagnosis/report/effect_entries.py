@@ -110,12 +110,14 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
     No model declares a surface that it lacks, nor do data say which point of a body touches it.
     """
     out: dict[str, Any] = {}
+    stuck = at_bounds(c, values)
     # A limit is tried from the largest torque in the data on, which is not where the model has it.
     declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
     if c.effect == SURFACE:
         told = (c.scales > 0) & np.isfinite(half)
         declared, half = (np.inf,) * len(values), np.where(told, half, np.nan)
-    for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
+    kinds = CATALOGUE[c.effect].parameters
+    for p, value, nominal, wide, bound in zip(kinds, values, declared, half, stuck, strict=True):
         if p.default is not None and value == p.default:
             continue
         ends = [float(value - wide), float(value + wide)]
@@ -130,6 +132,17 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
             shown = [end if np.isfinite(end) and not open_ends else None for end in inside]
             known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
             out[p.name] = {"value": float(value), "ci95": shown, "nominal": known, "unit": unit}
+        out[p.name] |= {"at_bound": True} if bound else {}
+    return out
+
+
+def at_bounds(c: Candidate, values: np.ndarray) -> np.ndarray:
+    """Whether each fitted parameter (P,) has gone from the declared value as far as it may."""
+    out, far = np.zeros(len(values), dtype=bool), c.scales / np.finfo(float).eps  # beyond the bounds of any parameter
+    for i in np.flatnonzero((c.scales > 0) & (values != np.array(c.nominal))):
+        end = values.copy()
+        end[i] = np.copysign(far[i], values[i] - c.nominal[i])
+        out[i] = np.isclose(c.clip(end)[i], values[i])
     return out
 
 

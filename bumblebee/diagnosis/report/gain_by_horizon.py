@@ -35,8 +35,13 @@ class GainByHorizon:
 
     @property
     def whole(self) -> bool:
-        """Whether it is worse nowhere, and at some horizon better for all kinds that are not at the noise floor."""
-        return not self.worse and any(name not in self.open for name in self.better)
+        """Whether it is surely better for all kinds at all horizons at which the declared one is off the floor."""
+        return bool(self.better) and not self.worse and not self.open
+
+    @property
+    def harms(self) -> bool:
+        """Whether it is surely worse at some horizon and surely better at none."""
+        return bool(self.worse) and not self.better
 
     @property
     def nothing_to_gain(self) -> bool:
@@ -97,7 +102,7 @@ def _verdict(entry: Mapping[str, Any], rules: ReportThresholds) -> str:
     if entry["ci95"]:
         low, high = entry["ci95"]
         return _BETTER if low > 0 else _WORSE if high < 0 else _OPEN
-    if entry["after"] < entry["before"]:
+    if rules.verdicts.worse * entry["after"] < entry["before"]:
         return _BETTER
     return _WORSE if entry["after"] > rules.verdicts.worse * entry["before"] else _OPEN
 
@@ -121,7 +126,7 @@ def whole_model(gain: GainByHorizon, warned: bool) -> str:
     rest = [f"not surely better {_after(gain, gain.open)}"] if gain.open else []
     worse = [f"it is worse than the declared one {_after(gain, gain.worse)}"] if gain.worse else []
     if gain.whole:
-        said = "; ".join([f"better {_after(gain, gain.better)}", *rest, *floor])
+        said = "; ".join([f"better {_after(gain, gain.better)}", *floor])
         trust = (
             "Read the warnings before you use the corrected model" if warned else "Trust the corrected model as a whole"
         )

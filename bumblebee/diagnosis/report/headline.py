@@ -140,7 +140,7 @@ def trusted(document: Mapping[str, Any], rules: ReportThresholds) -> str:
 
 def _readable(trust: Sequence[Mapping[str, Any]], rules: ReportThresholds) -> str:
     """Which effects are sizes by themselves, and why the others are not."""
-    known = [t for t in trust if t["group"] == CARRY and not t["wide"] and not t["alike"]]
+    known = [t for t in trust if t["group"] == CARRY and not (t["wide"] or t["alike"] or t.get("bound"))]
     text = f"read as sizes by themselves {_listed(_named(known), rules.listing.effects) or 'none'}"
     if len(known) == len(trust):
         return text
@@ -148,6 +148,8 @@ def _readable(trust: Sequence[Mapping[str, Any]], rules: ReportThresholds) -> st
     fold = f"{rules.matters.wide:g}-fold"
     why = [f"{wide} have intervals wider than {fold} or with the declared value in them"] if wide else []
     why += [f"{alike} look like another effect"] if alike else []
+    bound = sum(bool(t.get("bound")) for t in trust)
+    why += [f"{bound} at the end of the values that are tried"] if bound else []
     others = len(trust) - len(known)
     how = f"the other {others} only together" if others > 1 else "the other one only with the rest"
     return f"{text}; take {how}{_in_brackets(why)}"

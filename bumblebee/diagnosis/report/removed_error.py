@@ -63,10 +63,12 @@ def _share(
 ) -> dict[str, Any]:
     """RMS before and after of squares (2, W), and the share of the removable error that is gone, with its interval.
 
-    The share is None where the declared model is at the noise floor: there is nothing to remove.
+    The share is None where the declared model is at the noise floor: there is nothing to remove. Windows of a lone
+    rollout are drawn in the place of rollouts.
     """
     least, resamples = rule
-    names, index = np.unique(groups, return_inverse=True)
+    alone = len(np.unique(groups)) < 2
+    names, index = np.unique(np.arange(len(groups)) if alone else groups, return_inverse=True)
     sums = np.stack([np.bincount(index, row) for row in squares])
     counts = np.bincount(index).astype(float)
     before, after = np.sqrt(sums.sum(axis=1) / counts.sum())

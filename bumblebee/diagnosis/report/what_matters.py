@@ -113,7 +113,7 @@ def trust(effects: Sequence[Mapping[str, Any]], rule: Matters) -> list[dict[str,
     """Group and width of every effect, in the order of the list.
 
     `fold`: upper over lower end of the narrowest parameter; None where that includes no change, or has no end.
-    `alike`: these data cannot tell it from another effect.
+    `alike`: these data cannot tell it from another effect; `bound`: a parameter stands at the end of what is tried.
     """
     out = []
     for effect in effects:
@@ -121,8 +121,29 @@ def trust(effects: Sequence[Mapping[str, Any]], rule: Matters) -> list[dict[str,
         wide = fold is None or fold > rule.wide
         group = CARRY if (effect["explains"] or 0.0) >= rule.carries else WIDE if wide else BESIDE
         told = {"effect": effect["effect"], "where": effect["where"], "group": group}
-        out.append(told | {"fold": fold, "wide": wide, "alike": bool(effect["equivalent"])})
+        bound = bool(_bound(effect))
+        out.append(told | {"fold": fold, "wide": wide, "alike": bool(effect["equivalent"]), "bound": bound})
     return out
+
+
+def bound_warnings(effects: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One warning on effects with a parameter at the end of what is tried."""
+    told = [
+        f"{effect['effect']} on {', '.join(effect['where']) or 'the whole robot'} ({', '.join(stuck)})"
+        for effect in effects
+        if (stuck := _bound(effect))
+    ]
+    return (
+        [f"at the end of the values that are tried, so it may stand for another cause: {'; '.join(told)}"]
+        if told
+        else []
+    )
+
+
+def _bound(effect: Mapping[str, Any]) -> list[str]:
+    if effect["effect"] == "discovered":
+        return []
+    return [f"{name} {p['value']:.4g}" for name, p in effect["parameters"].items() if p.get("at_bound")]
 
 
 def _narrowest(effect: Mapping[str, Any]) -> float | None:

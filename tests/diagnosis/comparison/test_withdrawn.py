@@ -57,3 +57,17 @@ def test_structure_is_that_of_the_model_that_stands(monkeypatch) -> None:
     assert "withdrawn: all" in document["notes"]
     assert document["structure"]["j2"]["significant"]
     assert "j2" in document["unexplained"]["where"]
+
+
+def test_what_is_worse_on_held_out_rollouts_and_better_at_no_horizon_is_withdrawn(monkeypatch) -> None:
+    """Windows of 0.2 s in units of their noise may pass what errs more in radians after 1 s."""
+    rollouts = arm.simulate({("coulomb_friction", "j2"): 1.0}, count=3, seed=3)
+    session = arm.session_of(rollouts)
+    monkeypatch.setattr(diagnosis, "standing", lambda problem, fitted, read: ([WRONG], [], []))
+    found = diagnosis.diagnose(session, arm.SMALL)
+    assert found.effects == [] and found.document["effects"] == []
+    assert (
+        "withdrawn, for its error on the held-out rollouts was larger: coulomb_friction on j3"
+        in found.document["notes"]
+    )
+    assert found.document["error"]["after"] == found.document["error"]["before"]

@@ -30,7 +30,7 @@ RULES = ReportThresholds(
     prediction_error=PredictionError(whitened=(("0.02", 3), ("0.2", 3), ("1.0", 3))),
     effects=Effects(experiments=0),
     example_windows=ExampleWindows(lengths=(0.2,), ticks=5),
-    verdicts=Verdicts(large=0.0, worse=0.0),
+    verdicts=Verdicts(large=0.0),
     listing=Listing(effects=1, detectable=1, equivalent=1),
 )
 
@@ -69,13 +69,16 @@ def test_the_document_goes_by_what_was_set(set_: Diagnosis, default: Diagnosis) 
 
 
 def test_page_and_terminal_go_by_what_was_set(set_: Diagnosis, default: Diagnosis) -> None:
-    page, usual = (contents(made)["report.html"] for made in (set_, default))
+    strict = replace(RULES, verdicts=Verdicts(large=0.0, worse=0.0))  # every model is called worse
+    rooms = replace(set_.problem.thresholds, report=strict)
+    told = replace(set_, problem=replace(set_.problem, thresholds=rooms))
+    page, usual = (contents(made)["report.html"] for made in (told, default))
     assert "WORSE" in page and "WORSE" not in usual
     assert "Do not trust the corrected model" in page and "more in diagnosis.json" in page
-    better = render_report(set_.document, [], replace(RULES, verdicts=Verdicts(large=0.0)))
+    better = render_report(set_.document, [], RULES)
     assert "and 1 more" in better and "and 1 more" not in usual
     assert page.count("<svg") == 3 and len(page) < len(usual)
-    assert "WORSE" in summary(set_.document, RULES) and "WORSE" not in summary(default.document)
+    assert "WORSE" in summary(set_.document, strict) and "WORSE" not in summary(default.document)
 
 
 def test_the_intervals_of_replay_go_by_what_was_set(session: Session) -> None:

@@ -5,12 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.report.effect_entries import at_bounds
 from bumblebee.diagnosis.report.headline import effect_groups, headline, sized
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.removed_error import Ends, effectors, removed
 from bumblebee.diagnosis.report.terminal import summary
-from bumblebee.diagnosis.report.what_matters import left_over, quantities, structure, trust
+from bumblebee.diagnosis.report.what_matters import bound_warnings, left_over, quantities, structure, trust
 from bumblebee.diagnosis.thresholds.report import Matters, ReportThresholds
+from bumblebee.sim.effects import CATALOGUE
 from tests.measured.simulated import ARM_JOINTS, arm_model
 
 RULE = Matters()
@@ -106,6 +109,35 @@ def test_an_effect_is_trusted_by_what_it_explains_and_how_wide_its_interval_is(
     assert (told["group"], told["wide"]) == (group, wide)
 
 
+def test_an_effect_at_the_end_of_its_range_is_no_size_and_a_warning() -> None:
+    made = document()
+    made["effects"][0]["parameters"]["factor"]["at_bound"] = True
+    made["summary"]["trust"] = trust(made["effects"], RULE)
+    made["warnings"] = bound_warnings(made["effects"])
+    assert (
+        made["warnings"][0].startswith("at the end of the values that are tried") and "kp on a" in made["warnings"][0]
+    )
+    said = headline(made, ReportThresholds())[-1]
+    assert "as a whole" not in said and "read as sizes by themselves none" in said
+    assert "1 at the end of the values that are tried" in said
+
+
+def test_the_bound_is_where_a_fit_may_go_no_further() -> None:
+    candidate = Candidate("motor_strength", "j1", (1.0,), (-0.1,), (0,))
+    low, high = CATALOGUE["motor_strength"].bounds(candidate.nominal, candidate.limits)
+    assert [at_bounds(candidate, np.array([v])).tolist() for v in (low[0], 0.8, high[0], 1.0)] == [
+        [True], [False], [True], [False],
+    ]  # fmt: skip
+
+
+def test_the_interval_of_a_lone_rollout_is_over_its_windows() -> None:
+    rng = np.random.default_rng(0)
+    before, after = (size * rng.standard_normal((60, 1, 3)) for size in (0.1, 0.099))
+    ends = Ends(cuts(np.zeros(60, dtype=int), np.zeros((60, 3))), {"0.2": before}, {"0.2": after})
+    (told,) = removed(ends, {"floor": block(0.02, 0.02, 0.02)}, RULE)["0.2"]
+    assert told["ci95"][0] < 0 < told["ci95"][1]
+
+
 def test_quantities_are_cut_to_what_explains_most_of_the_torque() -> None:
     entry = {"law_shares": [0.02, 0.3, 0.05], "law_quantities": [["time"], ["position", "load"], ["speed"]],
              "depends_on": ["time", "position", "load", "speed"]}  # fmt: skip
@@ -143,7 +175,8 @@ AT_FLOOR, LEFT_FLOOR = entry(None, None), entry(None, None, 0.2)
 SLIDES, LOST_SLIDES = GAINED | {"what": "slides"}, LOST | {"what": "slides"}
 VERDICTS = {
     "better": ([[GAINED], [GAINED]], "Trust the corrected model as a whole (better after 0.2, 1.0 s); its gain"),
-    "unsure": ([[GAINED], [UNSURE]], "as a whole (better after 0.2 s; not surely better after 1.0 s); its gain"),
+    "unsure": ([[GAINED], [UNSURE]], "only where it is better, after 0.2 s: not surely better after 1.0 s; its gain"),
+    "a trifle": ([[entry(0.01, None, 0.099)]], "Do not trust the corrected model: at no horizon is it surely better"),
     "floor": ([[GAINED], [AT_FLOOR]], "better after 0.2 s; the declared model is at the noise floor after 1.0 s); its"),
     "worse": ([[GAINED], [LOST]], "only where it is better, after 0.2 s: it is worse than the declared one after 1.0"),
     "off it": ([[GAINED], [LEFT_FLOOR]], "only where it is better, after 0.2 s: it is worse than the declared"),
