@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.gap import Gap, gap
-from bumblebee.diagnosis.report import missing_lines, told_horizon
+from bumblebee.diagnosis.report import at_bounds, far_off, missing_lines, told_horizon
 from bumblebee.diagnosis.selection import Lead, Leads, leads
 from bumblebee.diagnosis.simulation import Plant, of_joint, unit_on
 from bumblebee.sim.effects import CATALOGUE
@@ -88,6 +88,10 @@ def told(look: FirstLook, whole: str) -> str:
         lines += [f"    or {rivals}"] if rivals else []
     if found.together or found.alone:
         lines += ["open: which of these it is, and what comes beside it. To tell them apart:", f"  {whole}"]
+    elif off := far_off(document["error"], document["floor"], rules.verdicts):
+        lines += [f"the declared model errs by {size}" for size in off]
+        lines.append("no single effect explains that: its drives, or the whole model, are off. To fit them together:")
+        lines.append(f"  {whole}")
     else:
         lines.append("no effect of the catalogue is sure alone")
     return "\n".join([*lines, *(f"note: {note}" for note in look.notes)])
@@ -118,4 +122,5 @@ def _sized(look: FirstLook, lead: Lead, digits: int = 4) -> str:
         p = CATALOGUE[c.effect].parameters[i]
         unit = unit_on(look.plant, c.effect, c.where, p.unit)
         parts.append(f"{p.name} = {values[i]:.{digits}g} {unit}".rstrip())
-    return f"{c.effect} {', '.join(parts)}"
+    ends = ", at the end of the values that are tried" if at_bounds(c, lead.values).any() else ""
+    return f"{c.effect} {', '.join(parts)}{ends}"

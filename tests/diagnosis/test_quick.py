@@ -6,7 +6,8 @@ import pytest
 
 from bumblebee.diagnosis.quick import FirstLook, first_look, told
 from bumblebee.diagnosis.selection import leads
-from tests.diagnosis import arm
+from bumblebee.sim.quiet import quiet_mujoco
+from tests.diagnosis import arm, cart
 from tests.diagnosis.strange_arm import simulate
 from tests.diagnosis.test_catalogue import CONFIG
 
@@ -66,3 +67,22 @@ def test_runs_too_short_for_a_window_are_reported_and_have_no_lead() -> None:
     look = first_look(arm.session_of(simulate({}, seed=3)), replace(CONFIG, horizon=60.0))
     assert look.report.torque is None and any("could not be tested" in note for note in look.notes)
     assert "too few windows to say" in told(look, WHOLE)
+
+
+def test_a_model_that_is_far_off_without_a_lead_is_said_to_be_off_as_a_whole() -> None:
+    """Springs a hundredfold too stiff and dampers a thousandfold: no single effect undoes both."""
+    declared = cart.xml().replace('damping="0.02"', 'damping="20"').replace('stiffness="40"', 'stiffness="4000"')
+    quiet_mujoco()
+    look = first_look(arm.session_of(cart.record(count=3), declared), CONFIG)
+    said = told(look, WHOLE)
+    assert look.leads.alone == look.leads.together == []
+    assert "no effect of the catalogue is sure alone" not in said
+    assert "times the noise floor" in said and "its drives, or the whole model, are off" in said
+    assert said.index("are off") < said.index(WHOLE)
+
+
+def test_a_lead_at_the_end_of_its_range_is_said_to_be_there() -> None:
+    light = cart.xml().replace('mass="2"', 'mass=".05"').replace('mass=".6"', 'mass=".02"')
+    light = light.replace(".01 .01 .001", ".0002 .0002 .0001")
+    said = told(first_look(arm.session_of(cart.record(count=3), light), CONFIG), WHOLE)
+    assert "motor_strength factor = 0.001, at the end of the values that are tried" in said

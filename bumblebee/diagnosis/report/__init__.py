@@ -1,7 +1,7 @@
 """Report of a diagnosis: a document, a page and lines for the terminal."""
 
 from bumblebee.diagnosis.report.document import Findings, document
-from bumblebee.diagnosis.report.effect_entries import effect_entries, law_notes, loss_entries
+from bumblebee.diagnosis.report.effect_entries import at_bounds, effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
 from bumblebee.diagnosis.report.gain_by_horizon import gain_of
 from bumblebee.diagnosis.report.html import (
@@ -19,7 +19,7 @@ from bumblebee.diagnosis.report.html import (
     warning,
 )
 from bumblebee.diagnosis.report.left_out import shares_left_out
-from bumblebee.diagnosis.report.notes import ALONE, nothing_seen, told_horizon, unseen_notes
+from bumblebee.diagnosis.report.notes import ALONE, far_off, nothing_seen, told_horizon, unseen_notes
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.prediction_error import (
     HorizonWindows,
@@ -38,12 +38,14 @@ __all__ = [
     "Findings",
     "HorizonWindows",
     "Inlay",
+    "at_bounds",
     "cloud_picture",
     "document",
     "effect_entries",
     "error_block",
     "error_rows",
     "examples",
+    "far_off",
     "figure",
     "floor_block",
     "gain_of",

@@ -144,22 +144,24 @@ def told_horizon(block: Mapping[str, Any]) -> str | None:
 
 def unexplained_error(document: Mapping[str, Any], rule: Verdicts) -> list[str]:
     """Lines on joint errors far above the noise that the effects, if any were found, do not explain."""
-    after, floor = document["error"]["after"], document["error"]["floor"]
-    horizon = told_horizon(after)
+    sizes = far_off(document["error"]["after"], document["error"]["floor"], rule)
+    if document["effects"]:
+        return [f"The corrected model still errs by {size}: the effects found do not explain that." for size in sizes]
+    return [f"The model errs by {size}, and no effect of the catalogue explains it." for size in sizes]
+
+
+def far_off(error: Mapping[str, Any], floor: Mapping[str, Any], rule: Verdicts) -> list[str]:
+    """Position errors of one block that are far above the noise, in words."""
+    horizon, sizes = told_horizon(error), list[str]()
     if horizon is None:
         return []
-    lines = []
-    for what, unit, scale, key in position_rows(after[horizon]):
-        value, noise = (pick(block.get(horizon, {}), key).get("value") for block in (after, floor))
-        if value is None or not noise or value <= rule.large * noise:
-            continue
-        times = number(value / noise, 2)
-        size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {times} times the noise floor"
-        if document["effects"]:
-            lines.append(f"The corrected model still errs by {size}: the effects found do not explain that.")
-        else:
-            lines.append(f"The model errs by {size}, and no effect of the catalogue explains it.")
-    return lines
+    for what, unit, scale, key in position_rows(error[horizon]):
+        value, noise = (pick(block.get(horizon, {}), key).get("value") for block in (error, floor))
+        if value is not None and noise and value > rule.large * noise:
+            times = number(value / noise, 2)
+            size = f"{number(scale * value)} {unit} in its {what} after {horizon} s"
+            sizes.append(f"{size}, {times} times the noise floor")
+    return sizes
 
 
 def what_is_left(document: Mapping[str, Any], rule: Verdicts) -> str:
