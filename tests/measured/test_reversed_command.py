@@ -93,3 +93,18 @@ def test_a_servo_before_a_gear_is_the_servo_behind_it(joint: int) -> None:
             share_for_reversed(View("r", rollout, m, None, Thresholds()), joint, True) for m in (model(True), geared)
         )
         assert before == pytest.approx(plain)
+
+
+FAR = {"damped": ('damping=".11"', 'damping="5"', 6), "turned": ('axis="1 0 0"', 'axis="0 1 0"', 6)}
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_a_model_that_is_too_far_off_to_tell_sets_nothing_aside(name: str) -> None:
+    """Damping fifty times too large, an axis that is another: the nearer prediction misses by more than the sign."""
+    old, new, seed = FAR[name]
+    text = TURNTABLE.replace("DRIVES", "".join(f'<motor joint="{j}"/>' for j in JOINTS)).replace(old, new)
+    far = mujoco.MjModel.from_xml_string(text.replace('damping=".03"', 'damping="3"') if name == "damped" else text)
+    view = View("r", record(seed), far, None, Thresholds())
+    assert share_for_reversed(view, 0, by_target=False) is None
+    found = [f for f in check_rollout(record(seed), far) if f.rule == "response-sign"]
+    assert found and not any(f.fatal for f in found)

@@ -32,9 +32,10 @@ RIDGE = 1e-7  # of columns of length 1: keeps collinear ones apart, as a resting
 def check_response(view: View) -> None:
     """A joint that moves against its command: the sign of one of the two columns is wrong.
 
-    Fatal where the whole state could be taken into account, unless the declared model moves so by itself (its
-    neighbours drive the joint); in a file too short for that only the joint's own was, and a person is told. A position
-    that merely follows the negative target is pointed out.
+    Fatal where the whole state could be taken into account and the declared model agrees, which moves so by itself
+    where neighbours drive the joint; where that cannot tell, the changes of position and target must clearly oppose
+    each other. In a file too short for the whole state a person is told, as where a position merely follows the
+    negative target.
     """
     rollout, limits = view.rollout, view.limits
     by_target = rollout.joint_target is not None
@@ -58,7 +59,8 @@ def check_response(view: View) -> None:
         mirrored = by_target and z < NOT_ALONG and together < MIRRORED and _follows_negative(view, place, given)
         if against or mirrored:
             share = share_for_reversed(view, joint, by_target) if against else None
-            overruled = share is not None and share < limits.response_model
+            opposes = by_target and together < -limits.response_correlation
+            sure = against and (opposes if share is None else share >= limits.response_model)
             came = f"motion against it ({-z:.0f} standard errors, correlation of the changes {together:.2f})"
             column = view.label(name, joint)
             view.add(
@@ -67,7 +69,7 @@ def check_response(view: View) -> None:
                 "response-sign",
                 "a joint that follows its command",
                 came,
-                fatal=against and whole and not overruled,
+                fatal=sure and whole,
             )
 
 

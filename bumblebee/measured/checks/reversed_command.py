@@ -4,8 +4,9 @@ A joint that swings with its neighbours goes against its own torque for seconds,
 state takes all of that away. The declared equations of motion know what neighbours, gravity and gears do. So short
 stretches are simulated from the measured state twice, with the command as logged and with its sign changed; where the
 two differ most, the command matters most, and there one of them is nearer to what was measured in nearly all stretches.
-What the model lacks besides (friction, strength, masses) is in both. Contacts are left out: a declared one may be
-closed where nothing touches, and then decides on both.
+What the model lacks besides (friction, strength, masses) is in both. Where that is so much that the nearer one misses
+by more than the two are apart, the model cannot tell. Contacts are left out: a declared one may be closed where nothing
+touches, and then decides on both.
 """
 
 import mujoco
@@ -33,8 +34,8 @@ def share_for_reversed(view: View, joint: int, by_target: bool) -> float | None:
 def share_for_multiple(view: View, joint: int, by_target: bool, factor: float) -> float | None:
     """Share of the stretches that the joint's command times `factor` predicts better than as logged.
 
-    None where the model cannot tell: on a floating base, whose contacts no log has, for a servo of unknown gains, and
-    where simulations diverge.
+    None where the model cannot tell: on a floating base, whose contacts no log has, for a servo of unknown gains, where
+    simulations diverge, and where the nearer prediction misses by more than the two are apart.
     """
     model = view.model
     if view.floating or min(view.joint_ids(), default=-1) < 0 or model.nq != len(view.rollout.joints):
@@ -51,7 +52,10 @@ def share_for_multiple(view: View, joint: int, by_target: bool, factor: float) -
     if good.mean() < MATTERS or not apart[good].any():
         return None
     matters = good & (apart >= np.quantile(apart[good], 1 - MATTERS)) & (apart > 0)
-    return float((np.abs(moved - other) < np.abs(moved - plain))[matters].mean())
+    misses = np.abs(moved - plain)[matters], np.abs(moved - other)[matters]
+    if np.median(np.minimum(*misses)) > np.median(apart[matters]):
+        return None
+    return float((misses[1] < misses[0]).mean())
 
 
 class _Torque:
