@@ -15,7 +15,7 @@ from bumblebee.measured.rollout import Rollout, read_rollout
 
 @dataclass(frozen=True)
 class Recordings:
-    """What was read of a dataset."""
+    """Rollouts of a dataset as read, and what was done to them."""
 
     named: tuple[tuple[str, Rollout], ...]
     """(file, rollout); parts of a recording have files of their own names."""

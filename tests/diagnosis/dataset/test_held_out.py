@@ -58,7 +58,7 @@ def test_what_cannot_be_held_out_is_said_in_one_line(text: str, says: str) -> No
 
 
 def test_rollouts_to_hold_out_that_were_set_aside_are_named(tmp_path: Path) -> None:
-    """Of a value all of whose rollouts were set aside a note is left; of all values nothing can be held out."""
+    """A value all of whose rollouts were set aside leaves a note; where no value is left nothing can be held out."""
     for k, rollout in enumerate(servo.record(THREE, each=1)):
         steady = (
             rollout.joint_pos if rollout.meta["kp"] != [2.5] else rollout.joint_pos + 5.0 * (rollout.time > 1)[:, None]
