@@ -28,7 +28,10 @@ _UNUSABLE: type[Exception] = typer.BadParameter.__bases__[0]  # the library's Us
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
 Data = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
 Minutes = Annotated[
-    float | None, typer.Option(min=0.1, max=10_000, help="Minutes; the search ends after half of them.")
+    float | None,
+    typer.Option(
+        min=0.1, max=10_000, help="Minutes for all of it; the search ends when what is left is needed for the end."
+    ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result of this command.")]
 

@@ -66,7 +66,7 @@ def diagnose(
         out: a new folder for diagnosis.json, model.xml, effects.yaml and report.html; None writes nothing.
         seed: seed of the perturbed starts.
         max_windows: windows of the fit.
-        minutes: time [min]; the search ends after half of it, and what it found is fitted and reported.
+        minutes: time [min]; the search leaves what the last fit and the errors of its effects take.
         say: called with a line for each step.
 
     Returns:

@@ -22,8 +22,10 @@ class Budget:
     setting: str = "beyond_seconds"
     """Where the seconds are set."""
     clock: Callable[[], float] = time.process_time
-    over: Callable[[], bool] = lambda: False
-    """Whether even running steps must end."""
+    over: Callable[[int], bool] = lambda effects: False
+    """Whether even running steps must end, with so many effects found."""
+    found: Callable[[], int] = lambda: 0
+    """How many effects are there by now."""
     left_out: list[str] = field(default_factory=list)
     """Work that was not begun, in words, each once."""
     early: bool = field(init=False, default=False)
@@ -33,9 +35,13 @@ class Budget:
     def __post_init__(self) -> None:
         self.began = self.clock()
 
+    def ends(self) -> bool:
+        """Whether even a running step must end."""
+        return self.over(self.found())
+
     def has_time_for(self, what: str) -> bool:
         """Whether `what` may begin; else it is written down."""
-        early = self.over()
+        early = self.ends()
         if self.clock() - self.began <= self.seconds and not early:
             return True
         self.early = self.early or early

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,9 @@ def diagnose(
 def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], None], stop: Stop) -> Diagnosis:
     """Diagnose on the threads that there are."""
     rng = np.random.default_rng(config.seed)
+    began = monotonic()
     material = gather(session, config, rng, say)
+    stop.opened = monotonic() - began
     found = _found(material, config, rng, say, stop)
     say(f"prediction error before and after {len(found.last.fit.chosen)} effects")
     shares = partial(shares_left_out, material.session, config.report_windows)
@@ -140,8 +143,7 @@ def _found(
     """The effects of the catalogue, then what lies beyond it."""
     larger = max(1.0, material.session.plant.model.nv / max(1, material.session.thresholds.time_steps.small_model))
     stop.searching = True
-    over = partial(stop.over, stop.search)
-    time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds", over=over)
+    time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds", over=stop.over)
     found = search(material.problem, material.holdout, material.remade, config.search, say, time)
     say(f"final fit of {len(found.fit.chosen)} effects")
     holdout = material.holdout.finely()
@@ -151,7 +153,7 @@ def _found(
     if not config.beyond:
         return _Found(found, _finished(last, holdout, found, stop), holdout, None, (time,))
     say("testing the residual")
-    budget = Budget(larger * config.beyond_seconds, over=partial(stop.over, stop.beyond))
+    budget = Budget(larger * config.beyond_seconds, over=stop.over, found=lambda: len(last.fit.chosen))
     offers = offers_of(found, material.candidates)
     activity = JointActivity(material.typical, material.still)
 
@@ -161,7 +163,7 @@ def _found(
 
     look = partial(discover, last.problem, holdout, last.fit, activity, say, offers, budget)
     try:
-        with ending(budget.over):
+        with ending(budget.ends):
             beyond = material.session.plant.failures.attempt("model discrepancy", look, tested)
     except OutOfTime:
         budget.has_time_for("discrepancy models")
@@ -178,7 +180,7 @@ def _finished(last: Refined, holdout: Holdout, found: Search, stop: Stop) -> Ref
     attempt, moved = last.problem.plant.failures.attempt, last
     every = found.columns.candidates
     try:
-        with ending(partial(stop.over, stop.finish)):
+        with ending(partial(stop.over, len(last.fit.chosen))):
             moved = attempt("least simulation error", lambda: least_simulation_error(last, holdout), lambda: last)
             return attempt("laws of hysteresis", lambda: with_other_laws(moved, holdout, every), lambda: moved)
     except OutOfTime:

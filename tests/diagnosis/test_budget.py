@@ -33,12 +33,12 @@ def test_the_note_says_which_search_was_cut_and_by_what_setting() -> None:
 
 def test_what_cut_a_search_is_said_though_the_other_limit_comes_later() -> None:
     now, over = [0.0], [False]
-    budget = Budget(60.0, clock=lambda: now[0], over=lambda: over[0])
+    budget = Budget(60.0, clock=lambda: now[0], over=lambda effects: over[0])
     now[0] = 61.0
     assert not budget.has_time_for("more effects")
     over[0] = True
     assert "60 s of processor time" in budget.notes()[0]
-    early = Budget(60.0, clock=lambda: 0.0, over=lambda: True)
+    early = Budget(60.0, clock=lambda: 0.0, over=lambda effects: True)
     assert not early.has_time_for("more effects") and "`--minutes` or a signal" in early.notes()[0]
 
 

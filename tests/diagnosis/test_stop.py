@@ -20,13 +20,19 @@ WEAK = {("motor_strength", "j3"): 0.7, ("coulomb_friction", "j1"): 0.4}
 
 def test_only_within_a_search_and_once_it_is_over_the_simulator_stops_it():
     stop = Stop()
-    with ending(lambda: stop.over(1.0)):
+    with ending(lambda: stop.over(0)):
         check()
         stop.asked = True
         with pytest.raises(OutOfTime):
             check()
     check()
-    assert Stop(minutes=0.0).over(1.0) and not Stop(minutes=9.0).over(0.5) and not Stop().over(1.0)
+    assert Stop(minutes=0.0).over(0) and not Stop(minutes=9.0).over(9) and not Stop().over(99)
+
+
+def test_the_search_leaves_the_time_that_fit_and_errors_of_its_effects_take():
+    stop = Stop(minutes=1.0, opened=4.0, last_fit=2.0, an_effect=0.5)  # 8 s, and 2 s an effect
+    stop.began = time.monotonic() - 30.0
+    assert not stop.over(10) and stop.over(12)
 
 
 def test_what_was_found_before_the_signal_is_fitted_and_reported():

@@ -123,7 +123,14 @@ class Asked:
     far: bool
 
 
-Change = Offered | Taken | Refitted | Renamed | FarOff | Windows | Lost | Vain | Asked
+@dataclass(frozen=True)
+class Expecting:
+    """So many effects may come at once from what is begun now; 0: it has ended."""
+
+    effects: int
+
+
+Change = Expecting | Offered | Taken | Refitted | Renamed | FarOff | Windows | Lost | Vain | Asked
 T = TypeVar("T")
 Asking = Generator[Change, bool, T]
 """A step that returns a T."""

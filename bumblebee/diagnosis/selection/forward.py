@@ -121,6 +121,7 @@ def begin(
 ) -> SearchState:
     """A search at its beginning: with servos far from the declared ones if need be, and all candidates screened."""
     run = SearchState(problem, holdout, remake, config, say)
+    budget.found = lambda: max(len(run.fit.chosen), run.expected)
     name, far = "gains far from the declared ones", partial(go, run, start_with_gain_grid)
     _in_time(run, budget, name, partial(problem.plant.failures.attempt, name, far, _no))
     run.open()
@@ -131,7 +132,7 @@ def _in_time(run: SearchState, budget: Budget, what: str, take: Callable[[], obj
     """Call `take`; where its time ends, leave the search as it was last whole, and write down `what` was cut off."""
     run.keep_whole()
     try:
-        with ending(budget.over):
+        with ending(budget.ends):
             take()
     except OutOfTime:
         run.go_back()

@@ -55,7 +55,7 @@ class SearchState:
         self.steps: list[Step] = []
         self.rejected: list[str] = []
         self.loss: Loss | None = None
-        self.given = 0
+        self.given, self.expected = 0, 0
         self._whole: dict[str, Any] = {}
         self.tried_many, self.asked_far, self.patience = False, False, config.patience
         self.fall, self.whitened_at = 1.0, self.power()

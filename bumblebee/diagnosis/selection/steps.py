@@ -9,6 +9,7 @@ from bumblebee.diagnosis.selection.changes import (
     Asked,
     Asking,
     Change,
+    Expecting,
     FarOff,
     Lost,
     Offered,
@@ -56,6 +57,9 @@ def _made(run: SearchState, change: Change) -> bool:
             _begin_anew(run, change)
         case Lost():
             _lose(run, change)
+        case Expecting():
+            run.expected = change.effects
+            return False
         case Vain():
             run.hopeless.add((change.effect, change.where))
             return False

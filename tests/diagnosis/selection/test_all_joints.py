@@ -105,6 +105,10 @@ def test_an_effect_taken_out_by_slopes_leaves_what_a_refit_in_the_simulator_leav
     assert moved_without(problem, full, weights, three).cost == pytest.approx(declared.cost, rel=0.05)
 
 
+def _plant(nv: int, floating: bool = False) -> SimpleNamespace:
+    return SimpleNamespace(model=SimpleNamespace(nv=nv), floating=floating, torque_input=False)
+
+
 def _run_with_one_effect(power: float, whitened_at: float) -> Any:
     """A search that has found one effect and is `power` off; its windows were whitened where that was `whitened_at`."""
     thresholds = Thresholds()
@@ -116,9 +120,7 @@ def _run_with_one_effect(power: float, whitened_at: float) -> Any:
         fit=SimpleNamespace(chosen=("one",)),
         rule=thresholds.selection.forward,
         config=SearchConfig(),
-        problem=SimpleNamespace(
-            thresholds=thresholds, plant=SimpleNamespace(model=SimpleNamespace(nv=29), floating=True)
-        ),
+        problem=SimpleNamespace(thresholds=thresholds, plant=_plant(29, floating=True)),
         holdout=None,
         candidates=[],
         say=lambda text: None,
@@ -133,7 +135,7 @@ def _took(run: SimpleNamespace, step: Asking[bool], left: float = 0.0) -> tuple[
     def make(change: Change) -> None:
         if isinstance(change, Asked):
             run.asked_far, run.tried_many = run.asked_far or change.far, run.tried_many or not change.far
-        elif not change.begun:
+        elif isinstance(change, Windows) and not change.begun:
             run.power = lambda: left
 
     return answered(step, make)
@@ -193,7 +195,7 @@ def test_a_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_
     run = _run_with_one_effect(case["power"], case["power"])
     run.fit = SimpleNamespace(chosen=case["chosen"], cost=case["before"])
     run.weights, run.asked_far = None, case["asked_far"]
-    run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=case["nv"]), floating=False)
+    run.problem.plant = _plant(case["nv"])
     tried = [SimpleNamespace(cost=case["least"], candidate=SimpleNamespace(where=case["where"]))]
     fit = SimpleNamespace(power=lambda problem: case["left"], residual=None)
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: fit)
@@ -213,7 +215,7 @@ def test_a_small_robot_that_nothing_brings_nearer_is_asked_for_all_joints_sooner
     tried: list[float] = []
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: tried.append(10.0))
     run = _run_with_one_effect(10.0, 10.0)
-    run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=nv), floating=False)
+    run.problem.plant = _plant(nv)
     assert not _took(run, start.start_with_all_joints(run, stuck=True))[0]
     assert bool(tried) is asked
 

@@ -26,7 +26,7 @@ from bumblebee.diagnosis.comparison import compare, walds
 from bumblebee.diagnosis.estimation import Fit, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.changes import Asking, FarOff
-from bumblebee.diagnosis.selection.proposals.all_joints import begun_with, fit_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints import all_joints_of, begun_with
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary
 from bumblebee.diagnosis.thresholds.proposals import GainGrid
@@ -181,7 +181,7 @@ def start_with_gain_grid(run: SearchState) -> Asking[bool]:
         return False
     # What leaves as much as would call for another beginning is none.
     below = min(fit.power(run.problem), run.config.far)
-    usual = fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
+    usual = yield from all_joints_of(run, below)
     if usual is not None and compare(run.problem, run.holdout, fit, usual).passes(rules.together):
         yield begun_with(run, usual)
         return True

@@ -16,6 +16,11 @@ that hardly moves is held by dry friction, not by damping (`held_joints`).
 """
 
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints
-from bumblebee.diagnosis.selection.proposals.all_joints.start import begun_with, start_far_off, start_with_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints.start import (
+    all_joints_of,
+    begun_with,
+    start_far_off,
+    start_with_all_joints,
+)
 
-__all__ = ["begun_with", "fit_all_joints", "start_far_off", "start_with_all_joints"]
+__all__ = ["all_joints_of", "begun_with", "fit_all_joints", "start_far_off", "start_with_all_joints"]

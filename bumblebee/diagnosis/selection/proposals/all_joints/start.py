@@ -8,7 +8,8 @@ import numpy as np
 from bumblebee.diagnosis.comparison import Holdout, compare
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
-from bumblebee.diagnosis.selection.changes import Asked, Asking, Windows
+from bumblebee.diagnosis.selection.changes import Asked, Asking, Expecting, Windows
+from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
@@ -42,6 +43,14 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     return replace(made, between=problem.between)
 
 
+def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]:
+    """Fit the usual effects of all joints, see `fit_all_joints`; all of them may come at once."""
+    yield Expecting(len(usual_effects(run.candidates, run.problem.plant.torque_input)))
+    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
+    yield Expecting(0)
+    return fit
+
+
 def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]:
     """Begin anew with the usual effects of all joints, where some effects leave large residuals; whether it did.
 
@@ -60,7 +69,7 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]
         if run.power() < run.config.many:
             return True
     yield Asked(far=False)
-    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
+    fit = yield from all_joints_of(run)
     rule = run.problem.thresholds.comparison.together
     if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
         return False
@@ -79,7 +88,7 @@ def start_far_off(run: SearchState, tried: Sequence[Trial]) -> Asking[bool]:
     if run.asked_far or run.fit.chosen or declared < run.config.far or not (small or _is_worth_minutes(run, tried)):
         return False
     yield Asked(far=True)
-    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
+    fit = yield from all_joints_of(run)
     little = rule.next_to_nothing if small else rule.little_of_large
     if fit is None or fit.power(run.problem) >= max(rule.still_off, little * declared):
         return False
