@@ -27,7 +27,7 @@ from bumblebee.diagnosis.report import (
     Findings,
     document,
     effect_entries,
-    gain_of,
+    gain_by_horizon,
     law_notes,
     loss_entries,
     shares_left_out,
@@ -114,7 +114,7 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     effects = [*effects, *steps, *losses]
     entries = [*entries, *(rounded if steps else []), *lost]
     told = _told(material, config, found, Findings(effects, entries, notes))
-    if effects and gain_of(told, config.thresholds.report).harms:
+    if effects and gain_by_horizon(told["summary"]["removed"], config.thresholds.report).harms:
         where = "held-out rollouts" if material.session.holdout else "fitted rollout"
         found, notes = _nothing(material, found), [*notes, withdrawn(effects, where)]
         effects = []

@@ -31,6 +31,8 @@ def parts_between(time: np.ndarray, edges: Iterable[int]) -> list[slice]:
 
 def cut_at_pauses(rollout: Rollout) -> list[Rollout]:
     """The parts of a rollout as rollouts NAME_1, NAME_2, ...; the rollout itself where it has no pause or no part."""
+    if not (np.diff(rollout.time) > 0).all():  # a clock that goes back is a finding of the checks
+        return [rollout]
     rows = pauses(rollout.time)
     parts = parts_between(rollout.time, rows) if rows else []
     return [_part(rollout, rows, number) for number, rows in enumerate(parts, 1)] or [rollout]

@@ -3,7 +3,7 @@
 from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import at_bounds, effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
-from bumblebee.diagnosis.report.gain_by_horizon import gain_of
+from bumblebee.diagnosis.report.gain_by_horizon import gain_by_horizon
 from bumblebee.diagnosis.report.html import (
     NO_INLAY,
     Inlay,
@@ -48,7 +48,7 @@ __all__ = [
     "far_off",
     "figure",
     "floor_block",
-    "gain_of",
+    "gain_by_horizon",
     "gap_summary",
     "horizon_whiteners",
     "horizon_windows",

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from bumblebee.diagnosis.selection.proposals import gain_grid
+from bumblebee.diagnosis.selection.proposals.all_joints import start
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.steps import go
@@ -55,7 +55,7 @@ def _far_off(windows: int) -> SearchState:
 
 def test_gains_that_are_far_off_stay_gains_where_all_joints_leave_no_less(monkeypatch: pytest.MonkeyPatch) -> None:
     run = _far_off(15)
-    monkeypatch.setattr(gain_grid, "fit_all_joints", lambda *_: run.fit)  # which leaves what the declared model leaves
+    monkeypatch.setattr(start, "fit_all_joints", lambda *_: run.fit)  # which leaves what the declared model leaves
     _with_gains(run)
 
 
