@@ -27,7 +27,7 @@ from bumblebee.diagnosis.report import (
     Findings,
     document,
     effect_entries,
-    gain_by_horizon,
+    harms,
     law_notes,
     loss_entries,
     shares_left_out,
@@ -114,9 +114,8 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     effects = [*effects, *steps, *losses]
     entries = [*entries, *(rounded if steps else []), *lost]
     told = _told(material, config, found, Findings(effects, entries, notes))
-    if effects and gain_by_horizon(told["summary"]["removed"], config.thresholds.report).harms:
-        where = "held-out rollouts" if material.session.holdout else "fitted rollout"
-        found, notes = _nothing(material, found), [*notes, withdrawn(effects, where)]
+    if effects and material.session.holdout and harms(told["summary"]["removed"]):
+        found, notes = _nothing(material, found), [*notes, withdrawn(effects, "held-out rollouts")]
         effects = []
         told = _told(material, config, found, Findings([], [], notes))
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)

@@ -3,7 +3,7 @@
 from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import at_bounds, effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
-from bumblebee.diagnosis.report.gain_by_horizon import gain_by_horizon
+from bumblebee.diagnosis.report.gain_by_horizon import harms
 from bumblebee.diagnosis.report.html import (
     NO_INLAY,
     Inlay,
@@ -48,8 +48,8 @@ __all__ = [
     "far_off",
     "figure",
     "floor_block",
-    "gain_by_horizon",
     "gap_summary",
+    "harms",
     "horizon_whiteners",
     "horizon_windows",
     "html_page",

@@ -39,14 +39,15 @@ class GainByHorizon:
         return bool(self.better) and not self.worse and not self.open
 
     @property
-    def harms(self) -> bool:
-        """Whether it is surely worse at some horizon and surely better at none."""
-        return bool(self.worse) and not self.better
-
-    @property
     def nothing_to_gain(self) -> bool:
         """Whether the declared model is at the noise floor at every horizon."""
         return bool(self.floor) and not (self.better or self.worse or self.open)
+
+
+def harms(removed: Mapping[str, Sequence[Mapping[str, Any]]]) -> bool:
+    """Whether the corrected model is surely worse at some horizon and surely better at none, by intervals alone."""
+    intervals = [entry["ci95"] for entries in removed.values() for entry in entries if entry["ci95"]]
+    return any(high < 0 for _, high in intervals) and not any(low > 0 for low, _ in intervals)
 
 
 def gain_by_horizon(removed: Mapping[str, Sequence[Mapping[str, Any]]], rules: ReportThresholds) -> GainByHorizon:
