@@ -114,10 +114,10 @@ def _from_checkout(command: str) -> None:
         BadInput: the library was installed by itself.
     """
     home = Path(__file__).parents[1]
-    if not (home / "flows").is_dir():
+    if not (home / "flows" / "cli_loop.py").is_file():
         raise BadInput(f"bumblebee {command}", "BumbleBee's checkout", "the library alone", CHECKOUT)
     if str(home) not in sys.path:
-        sys.path.append(str(home))
+        sys.path.insert(0, str(home))
 
 
 def missing(error: ModuleNotFoundError, command: str) -> BadInput:

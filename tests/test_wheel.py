@@ -1,14 +1,19 @@
 """The wheel by itself: its commands work where there is neither a checkout nor its folders `tasks` and `flows`."""
 
+import contextlib
+import functools
 import json
 import os
 import subprocess
 import sys
 import zipfile
+from importlib.metadata import PackageNotFoundError, distributions, packages_distributions, requires
 from pathlib import Path
 
 import numpy as np
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from bumblebee.measured.rollout import write_rollout
 from bumblebee.motion.formats.write import write_motion
@@ -19,7 +24,22 @@ from tests.motion.conftest import standing
 
 HOME = Path(__file__).parents[1]
 QUIET = ("--no-deps", "--no-build-isolation", "--disable-pip-version-check", "-q")
-CALL = "from bumblebee.cli import main; main()"
+CALL = """
+import os, sys
+gone = set(os.environ["GONE"].split())
+
+
+class Empty:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in gone:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+sys.meta_path.insert(0, Empty())
+from bumblebee.cli import main
+
+main()
+"""
 
 
 @pytest.fixture(scope="module")
@@ -45,15 +65,38 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return site
 
 
+@functools.cache
+def not_asked_for(site: Path) -> str:
+    """Modules of packages here that nothing which the wheel asks for brings: in an empty environment they are not."""
+    (own,) = distributions(path=[str(site)])
+    known, left = set(), list(own.requires or ())
+    while left:
+        wanted = Requirement(left.pop())
+        name = canonicalize_name(wanted.name)
+        if name in known or (wanted.marker and not wanted.marker.evaluate({"extra": ""})):
+            continue
+        known.add(name)
+        with contextlib.suppress(PackageNotFoundError):  # of another platform
+            left += requires(name) or ()
+    modules = packages_distributions().items()
+    return " ".join(module for module, names in modules if not {canonicalize_name(n) for n in names} & known)
+
+
 def call(installed: Path, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """`bumblebee WORDS` in a folder that is no checkout."""
-    env = {**os.environ, "PYTHONPATH": str(installed), "COLUMNS": "200"}
+    """`bumblebee WORDS` in a folder that is no checkout, with the packages alone that the wheel asks for."""
+    gone = set(not_asked_for(installed).split()) - {"bumblebee"}
+    env = {**os.environ, "PYTHONPATH": str(installed), "COLUMNS": "200", "GONE": " ".join(gone)}
     return subprocess.run([sys.executable, "-c", CALL, *words], cwd=folder, env=env, capture_output=True, text=True)
 
 
 def test_it_brings_one_package_to_import(wheel: Path) -> None:
     tops = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"bumblebee"}
+
+
+def test_what_it_does_not_ask_for_is_gone(installed: Path) -> None:
+    gone = set(not_asked_for(installed).split())
+    assert {"prefect", "mlflow", "dvc", "pytest"} <= gone and not gone & {"mujoco", "torch", "matplotlib", "trimesh"}
 
 
 def test_a_motion_is_inspected(installed: Path, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from types import ModuleType
 
 from bumblebee import effects
 from bumblebee.effects.kind import Kind
+from bumblebee.errors import BadInput
 
 ENTRY_POINTS = "bumblebee.effects"
 
@@ -23,7 +24,12 @@ def _modules() -> Iterator[ModuleType]:
         if not found.ispkg and found.name.count(".") == _DEPTH:
             yield import_module(found.name)
     for point in entry_points(group=ENTRY_POINTS):
-        yield import_module(point.module)
+        try:
+            yield import_module(point.module)
+        except ImportError as error:
+            package = point.dist.name if point.dist else "an installed package"
+            do = f"Mend the package, or uninstall it: pip uninstall {package}"
+            raise BadInput(f"{package}: effect {point.name}", "a module that can be imported", str(error), do) from None
 
 
 _DEPTH = 3  # dots of bumblebee.effects.ROOM.NAME

@@ -203,8 +203,8 @@ class Kind:
         """Torques for one step of each of the F free parameters of the candidate `c`.
 
         Args:
-            along: on a joint, `diagnosis.sensitivities.along.AlongJoint`, and the torques are (W, K), those of the
-                joint in each step; else `Signatures`, and they are (F, W, S, nv).
+            along: on a joint, `AlongJoint` of `diagnosis.sensitivities.torque_signatures`, and the torques are (W, K),
+                those of the joint in each step; else `Signatures`, and they are (F, W, S, nv).
             c: a `Candidate`.
         """
         raise ValueError(

@@ -28,16 +28,41 @@ print(json.dumps({"undone": done, "found": diagnose(arm.session_of(logs), arm.SM
 """
 
 
+SEALED = """
+import sys
+from types import SimpleNamespace
+import numpy as np
+import bumblebee.deploy.undeclared as room
+room.__path__.append(sys.argv[1])
+from bumblebee.deploy.stand_in_effects import declared_g1, entry, to_laws
+from bumblebee.deploy.undeclared.kinds import KINDS, LATER, Place
+
+kind = KINDS["hose_pull"]
+assert LATER[-1] is kind
+drawn = {"sign": -1, "axis": 0, "number": 1, "other": "left_knee_joint"}
+told = entry(kind, Place(declared_g1(), "left_knee_joint", drawn), 4.0)
+assert (told["parameters"], told["unit"]) == ({"stiffness": 4.0, "rest": -0.2}, "N m/rad^3, rad")
+(law,) = to_laws([told])
+push = np.zeros((2, 1))
+law.passive(SimpleNamespace(q=np.array([[0.3], [-0.2]]), column=lambda name: 0), push)
+assert np.allclose(push, [[-4.0 * 0.5**3], [0.0]])
+"""
+
+
+def blocks() -> dict[str, str]:
+    """Files of the worked example by their titles."""
+    page = (HOME / "docs/adding-an-effect.md").read_text()
+    return dict(re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```', page, re.M | re.S))
+
+
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the package, as an installation leaves it."""
     home = tmp_path_factory.mktemp("site")
-    page = (HOME / "docs/adding-an-effect.md").read_text()
-    blocks = {name: text for name, text in re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```', page, re.M | re.S)}
     (home / "lab_effects").mkdir()
     (home / "lab_effects/__init__.py").touch()
-    (home / "lab_effects/hose_pull.py").write_text(blocks["hose_pull.py"])
-    ((name, module),) = re.findall(r'^(\w+) = "([\w.]+)"$', blocks["pyproject.toml"], re.M)
+    (home / "lab_effects/hose_pull.py").write_text(blocks()["hose_pull.py"])
+    ((name, module),) = re.findall(r'^(\w+) = "([\w.]+)"$', blocks()["pyproject.toml"], re.M)
     info = home / "lab_effects-1.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-effects\nVersion: 1\n")
@@ -85,3 +110,23 @@ def test_what_it_lacks_is_named_with_its_file(package: Path, line: str, instead:
     finally:
         file.write_text(whole)
     assert f"TypeError: {file}: " in done.stderr and told in done.stderr
+
+
+def test_a_package_that_cannot_be_imported_is_named_in_one_line(package: Path) -> None:
+    file = package / "lab_effects/hose_pull.py"
+    whole = file.read_text()
+    file.unlink()
+    try:
+        done = run(package, "-c", "from bumblebee.cli import main; main()", "diagnose", "no.xml", "no", "--quick")
+        met = run(package, "-c", "from bumblebee.cli import main; main()", "compensate", "no.yaml", "--out", "c.yaml")
+    finally:
+        file.write_text(whole)
+    assert "no.xml" in done.stderr and done.returncode == 2  # what the user gave comes first
+    assert met.returncode == 2 and met.stderr.startswith("lab-effects: effect hose_pull: expected a module")
+    assert len(met.stderr.splitlines()) == 1
+
+
+def test_its_law_in_the_stand_in_is_found_and_sealed(tmp_path: Path) -> None:
+    (tmp_path / "hose_pull.py").write_text(blocks()["bumblebee/deploy/undeclared/hose_pull.py"])
+    done = run(tmp_path, "-c", SEALED, str(tmp_path))
+    assert done.returncode == 0, done.stderr

@@ -105,7 +105,7 @@ def open_session(
     if not rollouts:
         raise errors[0][1]
     lines = [line for _, one in reviewed for line in one.warnings if "rule gains" not in line]  # a note tells of gains
-    session = make_session(spec, rollouts, model, dataset, errors, lines, rules)
+    session = make_session(spec, rollouts, model, dataset, errors, lines, rules, known=True)
     session = replace(session, warnings=(*session.warnings, *doubts), notes=[*read.notes, *session.notes])
     return session if held_out is None else hold_out(session, held_out, [rollout for _, rollout in read.named])
 
@@ -118,11 +118,12 @@ def make_session(
     errors: Sequence[tuple[str, BadInput]] = (),
     warnings: Sequence[str] = (),
     thresholds: DatasetThresholds | None = None,
+    known: bool = False,
 ) -> Session:
     """Make a session from memory; `model` and `dataset` are names for messages.
 
     A rollout that cannot be used is set aside with its reason, as are those in `errors` (id, error), which could not be
-    read; where none is left the first reason ends it.
+    read; where none is left the first reason ends it. `known`: velocities that are too old were replaced already.
     """
     rules = thresholds or DatasetThresholds()
     long, failed = _sorted_out(rollouts, dataset, errors, rules.usable)
@@ -135,7 +136,7 @@ def make_session(
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
     old: list[str] = []
-    if not plant.floating:
+    if not plant.floating and not known:
         long, old = with_known_velocities(long, rules.velocity_latency)
     sigma = estimate_noise(long, layout, rules.noise)
     spec, contradicted, contact_notes = without_contradicted(spec, plant, layout, long, sigma, rules.contacts)

@@ -89,8 +89,8 @@ class FarOff:
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
-    """Windows that were whitened around a fit, to begin anew with; `begun`: with many effects at once."""
+class Anew:
+    """Anew that were whitened around a fit, to begin anew with; `begun`: with many effects at once."""
 
     problem: Problem
     holdout: Holdout
@@ -125,12 +125,12 @@ class Asked:
 
 @dataclass(frozen=True)
 class Expecting:
-    """So many effects may come at once from what is begun now; 0: it has ended."""
+    """So many effects may come at once before the step ends."""
 
     effects: int
 
 
-Change = Expecting | Offered | Taken | Refitted | Renamed | FarOff | Windows | Lost | Vain | Asked
+Change = Expecting | Offered | Taken | Refitted | Renamed | FarOff | Anew | Lost | Vain | Asked
 T = TypeVar("T")
 Asking = Generator[Change, bool, T]
 """A step that returns a T."""

@@ -113,11 +113,11 @@ def _limits(now: Round, run: SearchState) -> Asking[list[Trial]]:
 
 
 def _backlash(now: Round, run: SearchState) -> Asking[list[Trial]]:
-    return (yield from backlash_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless))
+    return (yield from backlash_trials(run))
 
 
 def _elasticity(now: Round, run: SearchState) -> Asking[list[Trial]]:
-    return (yield from joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless))
+    return (yield from joint_elasticity_trials(run))
 
 
 SINGLE = (

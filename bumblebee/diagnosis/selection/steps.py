@@ -6,6 +6,7 @@ from typing import TypeVar
 from bumblebee.diagnosis.comparison import certainty, evidence, wald
 from bumblebee.diagnosis.residuals import screening_windows, window_weights
 from bumblebee.diagnosis.selection.changes import (
+    Anew,
     Asked,
     Asking,
     Change,
@@ -17,7 +18,6 @@ from bumblebee.diagnosis.selection.changes import (
     Renamed,
     Taken,
     Vain,
-    Windows,
 )
 from bumblebee.diagnosis.selection.state import SearchState
 
@@ -27,12 +27,15 @@ T = TypeVar("T")
 def go(run: SearchState, step: Callable[[SearchState], Asking[T]]) -> T:
     """Take a step: make each change that it asks for, and return what it returns."""
     asking, other = step(run), None
-    while True:
-        try:
-            change = next(asking) if other is None else asking.send(other)
-        except StopIteration as end:
-            return end.value
-        other = _made(run, change)
+    try:
+        while True:
+            try:
+                change = next(asking) if other is None else asking.send(other)
+            except StopIteration as end:
+                return end.value
+            other = _made(run, change)
+    finally:
+        run.expected = 0
 
 
 def _made(run: SearchState, change: Change) -> bool:
@@ -53,7 +56,7 @@ def _made(run: SearchState, change: Change) -> bool:
             _rename(run, change)
         case FarOff():
             _begin_far_off(run, change)
-        case Windows():
+        case Anew():
             _begin_anew(run, change)
         case Lost():
             _lose(run, change)
@@ -88,7 +91,7 @@ def _begin_far_off(run: SearchState, change: FarOff) -> None:
     run.given = len(fit.chosen)
 
 
-def _begin_anew(run: SearchState, change: Windows) -> None:
+def _begin_anew(run: SearchState, change: Anew) -> None:
     """Go on from other windows; what was tried in vain may be tried again, many effects at once may not."""
     run.problem, run.holdout, run.fit = change.problem, change.holdout, change.fit
     run.keep = screening_windows(run.problem, run.config.screen_windows)

@@ -50,6 +50,7 @@ class Signatures:
         self.heat = memory.heat[:, None, order]
         self._inverse: dict[tuple[str, int], np.ndarray] = {}
         self.late = Late(plant, windows, path, self.servos)
+        self._joints = [AlongJoint(self, j) for j in range(len(plant.joints))]
 
     def of(self, candidate: Candidate) -> np.ndarray:
         """Torques (F, W, S, nv) for one step of each of the F free parameters."""
@@ -58,7 +59,7 @@ class Signatures:
             return np.asarray(kind.torque(self, candidate))
         joints = self.plant.joints
         columns = [joints.index(candidate.where)] if candidate.where else list(range(len(joints)))
-        parts = [kind.torque(AlongJoint(self, j), candidate) for j in columns]
+        parts = [kind.torque(self._joints[j], candidate) for j in columns]
         out = np.zeros((len(candidate.free), *self.path.mean(self.q).shape[:2], self.plant.model.nv))
         for j, torques in zip(columns, parts, strict=True):
             for f, torque in enumerate(torques):

@@ -34,8 +34,8 @@ def check_response(view: View) -> None:
 
     Fatal where the whole state could be taken into account and the declared model agrees, which moves so by itself
     where neighbours drive the joint; where that cannot tell, the changes of position and target must clearly oppose
-    each other. In a file too short for the whole state a person is told, as where a position merely follows the
-    negative target.
+    each other. Of a floating base, whose contacts no log has, no model is asked. In a file too short for the whole
+    state a person is told, as where a position merely follows the negative target.
     """
     rollout, limits = view.rollout, view.limits
     by_target = rollout.joint_target is not None
@@ -60,7 +60,7 @@ def check_response(view: View) -> None:
         if against or mirrored:
             share = share_for_reversed(view, joint, by_target) if against else None
             opposes = by_target and together < -limits.response_correlation
-            sure = against and (opposes if share is None else share >= limits.response_model)
+            sure = against and (opposes or view.floating if share is None else share >= limits.response_model)
             came = f"motion against it ({-z:.0f} standard errors, correlation of the changes {together:.2f})"
             column = view.label(name, joint)
             view.add(

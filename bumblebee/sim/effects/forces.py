@@ -12,6 +12,7 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | encoder_delay, encoder_quantisation | the servo's torque at the old, rounded reading instead of the present one |
 | command_filter, _rate_limit, _profile | the servo's torque at its set-point (`setpoints.py`), not at the target |
 | torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
+| torques without a memory (cogging, ...) | what `torque_at` of their file in `bumblebee/effects` gives |
 | external_wrench | xfrc_applied |
 | hysteresis by Dahl's law | -amplitude z; dz/dt = v / width (1 - sgn(v) z) |
 | backlash, series_elasticity, encoder on the joint | the servo's torque also turns the rotor on its own hinge |

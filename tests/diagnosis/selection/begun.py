@@ -2,13 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
+from types import SimpleNamespace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from bumblebee.diagnosis.candidates import all_candidates
 from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.config import SearchConfig
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.changes import Asking, Change
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.thresholds import Thresholds
@@ -29,6 +32,12 @@ def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML, windows: int 
         return all_candidates(session.plant, session.rollouts, effects), np.full(3, 5.0)
 
     return SearchState(problem, Holdout(other), remake, SearchConfig(), lambda text: None)
+
+
+def state(problem: Problem, fit: Fit, candidates: list, weights: np.ndarray, **more: Any) -> Any:
+    """Part of a search's state that a proposal reads."""
+    given = {"problem": problem, "fit": fit, "candidates": candidates, "weights": weights, "hopeless": set()}
+    return SimpleNamespace(**given | more)
 
 
 def answered(step: Asking[T], make: Callable[[Change], object] = lambda change: False) -> tuple[T, list[Change]]:

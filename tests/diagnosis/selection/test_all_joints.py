@@ -18,7 +18,7 @@ from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
-from bumblebee.diagnosis.selection.changes import Asked, Asking, Change, Windows
+from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Change
 from bumblebee.diagnosis.selection.proposals.all_joints import fit as fit_module
 from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints, start
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of_large, usual_effects
@@ -135,7 +135,7 @@ def _took(run: SimpleNamespace, step: Asking[bool], left: float = 0.0) -> tuple[
     def make(change: Change) -> None:
         if isinstance(change, Asked):
             run.asked_far, run.tried_many = run.asked_far or change.far, run.tried_many or not change.far
-        elif isinstance(change, Windows) and not change.begun:
+        elif isinstance(change, Anew) and not change.begun:
             run.power = lambda: left
 
     return answered(step, make)
@@ -204,7 +204,7 @@ def test_a_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_
     monkeypatch.setattr(start, "whitened_anew", lambda problem, holdout, fit: (problem, holdout, fit))
     began, asked = _took(run, start.start_far_off(run, tried))
     assert began is begins
-    assert [change.fit for change in asked if isinstance(change, Windows)] == [fit] * begins
+    assert [change.fit for change in asked if isinstance(change, Anew)] == [fit] * begins
     assert not _took(run, start.start_far_off(run, tried))[0]  # it is asked once, and only then
 
 
@@ -228,7 +228,7 @@ def test_what_left_too_much_to_begin_with_is_asked_again_where_nothing_helps(mon
     run = _run_with_one_effect(100.0, 100.0)
     run.fit, run.asked_far = SimpleNamespace(chosen=()), True
     began, asked = _took(run, start.start_with_all_joints(run, stuck=True))
-    assert began and [change.fit for change in asked if isinstance(change, Windows)] == ["a fit"]
+    assert began and [change.fit for change in asked if isinstance(change, Anew)] == ["a fit"]
 
 
 def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyPatch) -> None:

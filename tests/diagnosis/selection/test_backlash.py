@@ -11,7 +11,7 @@ from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares, odd_joints
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds
 from tests.diagnosis import arm
-from tests.diagnosis.selection.begun import answered
+from tests.diagnosis.selection.begun import answered, state
 from tests.diagnosis.strange_arm import Truth, simulate
 
 
@@ -55,7 +55,7 @@ def test_a_gap_is_tried_where_there_is_one(truth: Truth) -> None:
     problem = material.problem
     fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
     weights = window_weights(fit.clean(problem))
-    found, _ = answered(backlash_trials(problem, fit, material.candidates, weights, set()))
+    found, _ = answered(backlash_trials(state(problem, fit, material.candidates, weights)))
     if not truth:
         assert not found
         return

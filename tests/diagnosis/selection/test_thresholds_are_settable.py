@@ -33,7 +33,7 @@ from bumblebee.diagnosis.thresholds.proposals import (
 )
 from bumblebee.diagnosis.thresholds.selection import SelectionThresholds
 from tests.diagnosis import arm
-from tests.diagnosis.selection.begun import answered
+from tests.diagnosis.selection.begun import answered, state
 
 WINDOWS, OFF = 8, 3
 
@@ -109,7 +109,7 @@ def test_backlash_is_not_tried_above_the_power_that_is_set(session: Session, mon
     for most in (0.0, np.inf):
         problem = _problem(session, ProposalThresholds(backlash=Backlash(most_usual_power=most)))
         fit = gauss_newton(problem, (), (), np.ones(WINDOWS))
-        assert answered(backlash_trials(problem, fit, [], np.ones(WINDOWS), set())) == ([], [])
+        assert answered(backlash_trials(state(problem, fit, [], np.ones(WINDOWS)))) == ([], [])
         assert len(asked) == (most > 0)
 
 

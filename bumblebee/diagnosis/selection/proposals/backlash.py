@@ -7,7 +7,7 @@ a geometric series of gaps on those windows, and the best of them on all. Its ga
 as of `proposals.saturation`.
 """
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,34 +18,30 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.changes import Asking, Vain
 from bumblebee.diagnosis.selection.profile import profile, stepped
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, odd_joints
+from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.thresholds.proposals import Backlash
 
 KIND = "backlash"
 
 
-def backlash_trials(
-    problem: Problem,
-    fit: Fit,
-    candidates: Sequence[Candidate],
-    weights: np.ndarray,
-    hopeless: Container[tuple[str, str]],
-) -> Asking[list[Trial]]:
+def backlash_trials(run: SearchState) -> Asking[list[Trial]]:
     """The backlash that explains most; none where none does.
 
     Its joint and those on which none does are then `hopeless`, (effect, joint). These are not tried again:
     a backlash that is refused now would be refused again.
     """
+    problem, fit = run.problem, run.fit
     clean = fit.clean(problem)
     usual = max(typical_power(clean), 1.0)
     if usual > problem.thresholds.selection.proposals.backlash.most_usual_power:
         return []
     found = []
     for where, odd in odd_joints(problem, clean):
-        own = [c for c in candidates if c.effect == KIND and c.where == where and not is_chosen(c, fit.chosen)]
-        if (KIND, where) in hopeless:
+        own = [c for c in run.candidates if c.effect == KIND and c.where == where and not is_chosen(c, fit.chosen)]
+        if (KIND, where) in run.hopeless:
             continue
-        tried = [t for t in (_best(problem, fit, weights, usual, c, odd) for c in own) if t is not None]
+        tried = [t for t in (_best(problem, fit, run.weights, usual, c, odd) for c in own) if t is not None]
         if not tried:
             yield Vain(KIND, where)
         found += tried

@@ -7,7 +7,7 @@ inertia. A geometric series of stiffnesses tells: where an effect of that kind w
 noise. Only the best of the series is simulated on all windows.
 """
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.changes import Asking, Vain
 from bumblebee.diagnosis.selection.profile import profile
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares
+from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.simulation import Plant
 from bumblebee.diagnosis.thresholds.proposals import JointElasticity
@@ -27,17 +28,12 @@ KIND = "series_elasticity"
 LIKE = ("torque_lag", "encoder_delay", "command_delay", "armature", "kp", "kd", "series_elasticity")
 
 
-def joint_elasticity_trials(
-    problem: Problem,
-    fit: Fit,
-    candidates: Sequence[Candidate],
-    weights: np.ndarray,
-    hopeless: Container[tuple[str, str]],
-) -> Asking[list[Trial]]:
+def joint_elasticity_trials(run: SearchState) -> Asking[list[Trial]]:
     """The elasticity that explains most on one of the joints that are furthest off; none where none does.
 
     Each joint is tried once and then among the `hopeless`, (effect, joint).
     """
+    problem, fit = run.problem, run.fit
     rule = problem.thresholds.selection.proposals.joint_elasticity
     clean = fit.clean(problem)
     own, freedom = joint_chi_squares(problem, clean)
@@ -45,10 +41,10 @@ def joint_elasticity_trials(
     off = (own - freedom).sum(axis=0) / np.sqrt(2.0 * freedom * len(own))
     for j in np.argsort(-off)[: rule.joints]:
         where = problem.plant.joints[j]
-        if off[j] < rule.least_errors or (KIND, where) in hopeless:
+        if off[j] < rule.least_errors or (KIND, where) in run.hopeless:
             continue
         yield Vain(KIND, where)
-        best = best_elasticity(problem, fit, candidates, weights, where)
+        best = best_elasticity(problem, fit, run.candidates, run.weights, where)
         if best:
             return [best]
     return []

@@ -1,6 +1,4 @@
-"""Packet loss: commands that never arrived.
-
-A likelihood of each window's course over all ways in which its commands can be lost.
+"""Packet loss, commands that never arrived: a likelihood of each window's course over all ways to lose its commands.
 
 A lost command leaves the one before in force for a tick. What that does to a window's readings is simulated for every
 tick and every length of a run of losses; to first order the effects of several add up, so that the residual of a window

@@ -8,7 +8,7 @@ import numpy as np
 from bumblebee.diagnosis.comparison import Holdout, compare
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
-from bumblebee.diagnosis.selection.changes import Asked, Asking, Expecting, Windows
+from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Expecting
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small
 from bumblebee.diagnosis.selection.state import SearchState
@@ -18,7 +18,7 @@ from bumblebee.sim.effects import Effect
 
 
 def whitened_anew(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Problem, Holdout, Fit]:
-    """Windows to fit and to judge whitened anew around a fit that is far from the declared model, and fitted there."""
+    """Anew to fit and to judge whitened anew around a fit that is far from the declared model, and fitted there."""
     problem = _whitened_around(problem, fit.effects)
     if holdout.problem is not None:
         holdout = replace(holdout, problem=_whitened_around(holdout.problem, fit.effects))
@@ -46,9 +46,7 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
 def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]:
     """Fit the usual effects of all joints, see `fit_all_joints`; all of them may come at once."""
     yield Expecting(len(usual_effects(run.candidates, run.problem.plant.torque_input)))
-    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
-    yield Expecting(0)
-    return fit
+    return fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
 
 
 def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]:
@@ -65,7 +63,7 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]
     if run.tried_many or run.given or power < run.config.many or (power < far if stuck else early):
         return False
     if run.power() < run.rule.whiten_anew * run.whitened_at:
-        yield Windows(*whitened_anew(run.problem, run.holdout, run.fit))
+        yield Anew(*whitened_anew(run.problem, run.holdout, run.fit))
         if run.power() < run.config.many:
             return True
     yield Asked(far=False)
@@ -108,6 +106,6 @@ def _is_worth_minutes(run: SearchState, tried: Sequence[Trial]) -> bool:
     return all(t.cost > (place if t.candidate.where else whole) for t in tried)
 
 
-def begun_with(run: SearchState, fit: Fit) -> Windows:
+def begun_with(run: SearchState, fit: Fit) -> Anew:
     """A beginning anew with many effects at once."""
-    return Windows(*whitened_anew(run.problem, run.holdout, fit), begun=True)
+    return Anew(*whitened_anew(run.problem, run.holdout, fit), begun=True)
