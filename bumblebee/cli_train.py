@@ -1,4 +1,4 @@
-"""Command line: `bumblebee train`, `evaluate`."""
+"""Command line: `bumblebee train`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,9 +6,8 @@ from typing import Annotated
 import typer
 
 from bumblebee.cli_files import CsvFps, Settings
-from bumblebee.errors import BadInput, plain
+from bumblebee.errors import plain
 from bumblebee.io.there import require_motions
-from bumblebee.learning.pretrained import require_policy
 
 _PIECE = 10.0  # s: the longest episode of a training
 
@@ -63,47 +62,3 @@ def train(
         print(line)
     print("\n".join(line for line in tried(made.trials, splits(parent_of(config.start))) if line))
     print(f"written: {out}: policy.onnx, contract.json, README.md (the card), film.gif, policy.pt, trials.csv")
-
-
-def evaluate(
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or shipped, randomised, imu.")],
-    motions: Annotated[str, typer.Argument(metavar="MOTIONS", help="Motion files, or `embedded`.")] = "embedded",
-    out: Annotated[Path | None, typer.Option("--out", help="CSV file with a row a rollout.")] = None,
-    states: Annotated[
-        Path | None, typer.Option("--states", metavar="FOLDER", help="New folder that `bumblebee view` shows.")
-    ] = None,
-    repeats: Annotated[int, typer.Option("--repeats", help="Rollouts of each motion.")] = 1,
-    noise: Annotated[float, typer.Option("--noise", help="Factor on the noise of start and sensors.")] = 0.0,
-    limit: Annotated[int | None, typer.Option("--limit", min=1, help="Motions at most.")] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the noise.")] = 0,
-    csv_fps: CsvFps = None,
-    settings: Settings = None,
-) -> None:
-    """Let a policy follow motions in MuJoCo, and print how many it follows and how closely."""
-    require_policy(policy)
-    if motions != "embedded":
-        require_motions(Path(motions))
-    from bumblebee.api.motions import EMBEDDED, read_motions
-    from bumblebee.api.policies import evaluate as run
-    from bumblebee.api.policies import load_policy
-    from bumblebee.api.policy_card import tried
-    from bumblebee.io.write import refuse_existing, try_output, write_file
-    from bumblebee.motion.one_file import stated
-    from bumblebee.sim.quiet import quiet_mujoco
-
-    quiet_mujoco()
-    if out is not None:
-        refuse_existing(out)
-        try_output(out)
-    loaded, files = load_policy(policy), stated(settings or [], csv_fps=csv_fps)
-    embedded = {} if limit is None else {"limit": limit}
-    clips = read_motions(motions, say=print, **(embedded if motions == EMBEDDED else vars(files)))
-    if not clips:
-        raise BadInput(motions, "a motion", "none")
-    table = run(loaded, clips[:limit], repeats=repeats, noise=noise, seed=seed, out=states)
-    print("\n".join(line for line in tried(table, {"train": "motions"}, noise) if line))
-    if out is not None:
-        write_file(out, table.to_csv(index=False))
-        print(f"written: {out}")
-    if states is not None:
-        print(f"written: {states}; `bumblebee view {states}` shows it")

@@ -38,7 +38,7 @@ TABLE: dict[str, tuple[Command, ...]] = {
     ),
     TRAIN: (
         Command("train", "bumblebee.cli_train:train", "Train a policy on a folder of motions."),
-        Command("evaluate", "bumblebee.cli_train:evaluate", "Try a policy on motions: success and errors."),
+        Command("evaluate", "bumblebee.cli_evaluate:evaluate", "Try a policy on motions: success and errors."),
         Command("fetch", "flows.cli_loop:fetch", "Copy a registered policy out of a workspace or a server."),
     ),
     MEASURE: (

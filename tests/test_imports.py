@@ -18,7 +18,7 @@ FLOORS = [
     {"clustering", "tracking", "diagnosis"},
     {"learning", "evaluation"},
     {"deploy", "baselines"},
-    {"report", "wire"},
+    {"report", "wire", "peers"},
     {"api", "view"},
 ]
 ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"effects", "sim", "measured"}}
