@@ -1,5 +1,6 @@
 """Command line: `bumblebee evaluate`."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -91,7 +92,8 @@ def _require_inputs(policy: str, motions: str, contract: str | None, against: st
         require_motions(Path(motions))
 
 
-def _require_unused(given: dict[str, object], why: str) -> None:
+def _require_unused(given: Mapping[str, object], why: str) -> None:
+    """`BadInput` for the first option that is said and has no meaning here."""
     for option, value in given.items():
         if value:
             raise BadInput(option, "no such option here", str(value), f"It {why}")

@@ -19,6 +19,7 @@ _KEYS = "docs/peers.md lists the fields."
 Names = Annotated[tuple[Name, ...], Size(most=1000)]
 Angles = Annotated[tuple[Annotated[float, Range(least=-6.3, most=6.3)], ...], Size(most=1000)]
 Positive = Annotated[tuple[Annotated[float, Range(least=0, most=1e5)], ...], Size(most=1000)]
+Optional = Annotated[tuple[Annotated[float, Range(least=0, most=1e5)], ...], Size(least=0, most=1000)]
 Numbers = Annotated[tuple[Annotated[float, Range(least=-1e5, most=1e5)], ...], Size(most=1000)]
 
 
@@ -108,9 +109,9 @@ class PeerContract(Ranged):
     """Rate of the policy [Hz]."""
     physics_hz: Annotated[float, Range(least=1, most=100_000)] = 200.0
     """Rate of the physics in its own simulation [Hz]."""
-    effort_limit: Positive = ()
+    effort_limit: Optional = ()
     """Largest torque that the servos ask for [N m]; the motors' own limits hold too. Empty: those alone."""
-    armature: Positive = ()
+    armature: Optional = ()
     """Rotor inertia of the joints in its own simulation [kg m^2]; empty: the G1's."""
     floor_friction: Annotated[float, Range(least=0, most=10)] = 1.0
     """Sliding friction of the floor in its own simulation."""

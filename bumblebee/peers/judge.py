@@ -6,10 +6,10 @@ import pandas as pd
 import torch
 from torch import Tensor
 
+from bumblebee.baselines.geometry import heading_inverse, turned
 from bumblebee.baselines.trial import ThreeRules
 from bumblebee.learning.rollout import Tick
 from bumblebee.motion.clip import Clip
-from bumblebee.sim.rotations import rotate
 from bumblebee.tracking.terminations import fallen
 
 
@@ -33,21 +33,13 @@ class FourRules(ThreeRules):
 
 
 def turned_key_errors(tick: Tick) -> Tensor:
-    """Distances (B, K) [m] of the key bodies from the reference whose root is moved over the robot's and turned.
+    """Distances (B, K) [m] of the key bodies from the reference, both seen from their roots and headings.
 
-    It is moved in the plane and turned about the vertical through it, until it has the robot's heading.
+    As if the reference were moved in the plane until its root stands over the robot's, and turned about the vertical
+    through it to the robot's heading.
     """
     state, ref = tick.state, tick.ref
-    half = 0.5 * (heading(state.root_quat_w) - heading(ref.root_quat_w))
-    none = torch.zeros_like(half)
-    turn = torch.stack((half.cos(), none, none, half.sin()), dim=-1)
     place = torch.cat((state.root_pos_w[:, :2], ref.root_pos_w[:, 2:]), dim=1)
-    offset = ref.key_pos_w - ref.root_pos_w[:, None]
-    wanted = place[:, None] + rotate(turn[:, None].expand(-1, offset.shape[1], -1), offset)
-    return (state.key_pos_w - wanted).norm(dim=-1)
-
-
-def heading(quat: Tensor) -> Tensor:
-    """Yaw (B,) [rad] of orientations (B, 4)."""
-    w, x, y, z = quat.unbind(-1)
-    return torch.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    robot = turned(heading_inverse(state.root_quat_w), state.key_pos_w - place[:, None])
+    wanted = turned(heading_inverse(ref.root_quat_w), ref.key_pos_w - ref.root_pos_w[:, None])
+    return (robot - wanted).unflatten(1, (-1, 3)).norm(dim=-1)

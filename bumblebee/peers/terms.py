@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from bumblebee.baselines.geometry import roll_pitch_yaw
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.tracking.library import ReferenceFrame
@@ -37,11 +38,8 @@ class TermKind:
 
 
 def roll_pitch(quat: Tensor) -> Tensor:
-    """Roll and pitch (B, 2) [rad] of orientations (B, 4): the turns about x, then y, that yaw about z comes after."""
-    w, x, y, z = quat.unbind(-1)
-    roll = torch.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = torch.asin((2 * (w * y - z * x)).clamp(-1.0, 1.0))
-    return torch.stack((roll, pitch), dim=-1)
+    """Roll and pitch (B, 2) [rad] of orientations (B, 4)."""
+    return torch.stack(roll_pitch_yaw(quat)[:2], dim=-1)
 
 
 def gravity(quat: Tensor) -> Tensor:
