@@ -9,6 +9,7 @@ Of a motion that is held out (`--split test`) the pieces and, where the filter d
 
 import argparse
 from collections.abc import Sequence
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pandas as pd
@@ -16,6 +17,7 @@ import pandas as pd
 from benchmarks.motion_pack import read_pack, whole_motions
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.pieces import motion_of
 from bumblebee.peers.policy import Peer
 from bumblebee.peers.table import differences, table
 from bumblebee.peers.trial import Setting, ours, try_ours, try_peer
@@ -24,11 +26,23 @@ from bumblebee.sim.quiet import quiet_mujoco
 SETTINGS = [Setting(model, gains) for model in ("own", "declared") for gains in ("own", "declared")]
 
 
-def clips_of(pack: Path, splits: Sequence[str], groups: Sequence[str]) -> dict[str, list[Clip]]:
-    """Motions of a pack, as "whole" and as "pieces"; those made here are left out unless they are asked for."""
-    rows = [row for row in read_pack(pack) if row.group in groups or (not groups and row.group != "embedded")]
+def clips_of(pack: Path, splits: Sequence[str], only: Sequence[str]) -> dict[str, list[Clip]]:
+    """Motions of a pack as "pieces" and as "whole", those made here left out.
+
+    Args:
+        pack: file of benchmarks.motion_pack.
+        splits: "train", "test" or both.
+        only: patterns of the names of motions; all without.
+    """
+    rows = [
+        row
+        for row in read_pack(pack)
+        if row.group != "embedded"
+        and row.clip.split in splits
+        and (not only or any(fnmatch(motion_of(row.clip.name), pattern) for pattern in only))
+    ]
     kinds = {"pieces": [row for row in rows if row.kept], "whole": whole_motions(rows)}
-    return {kind: [row.clip for row in some if row.clip.split in splits] for kind, some in kinds.items()}
+    return {kind: [row.clip for row in some] for kind, some in kinds.items()}
 
 
 def report(peer: Peer, against: str, clips: Sequence[Clip], threads: int) -> tuple[list[str], pd.DataFrame]:
@@ -52,7 +66,7 @@ def main() -> None:
     parser.add_argument("--motions", type=Path, required=True, help="file of benchmarks.motion_pack")
     parser.add_argument("--against", default="shipped")
     parser.add_argument("--split", nargs="+", default=["test"], choices=("train", "test"))
-    parser.add_argument("--groups", nargs="+", default=[], help="sources of the pack; all real ones without")
+    parser.add_argument("--only", nargs="+", default=[], metavar="PATTERN", help="names of motions; all without")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
@@ -60,7 +74,7 @@ def main() -> None:
     try:
         peer = Peer.load(options.onnx, options.contract)
         options.out.mkdir(parents=True, exist_ok=True)
-        for kind, clips in clips_of(options.motions, options.split, options.groups).items():
+        for kind, clips in clips_of(options.motions, options.split, options.only).items():
             lines, trials = report(peer, options.against, clips, options.threads)
             text = "\n".join([f"{kind}: {len(clips)}, {sum(clip.duration for clip in clips):.0f} s", "", *lines])
             print(text, flush=True)

@@ -70,3 +70,31 @@ def test_terms_by_hand():
     bent = replace(reference(), joint_pos=torch.ones(1, 23))
     assert value("joint_pos") == [-0.1] * 23 and value("reference_joint_pos", ref=bent) == [1.0] * 23
     assert value("reference_joint_pos_from_default", ref=bent) == [0.9] * 23
+
+
+def test_twist2s_input_is_the_one_that_its_server_builds():
+    """127 now, the ten steps before from zeros with the oldest first, and the reference's 35 again."""
+    contract = read_contract("twist2")
+    observer, generator = Observer(contract), torch.Generator().manual_seed(1)
+    default = np.array(contract.default_pos, np.float32)
+    moving = np.array(["ankle" not in joint for joint in contract.joints])
+    past = [np.zeros((N, 127), np.float32)] * 10
+    for _ in range(12):
+        lean = from_rotation_vector(torch.tensor([[0.1, 0.0, 0.0], [0.0, -0.3, 0.0]]))
+        now, last = replace(robots(generator), root_quat_w=lean), torch.randn(N, J, generator=generator)
+        wanted = torch.randn(N, J + 6, generator=generator)
+        ref = reference(N, joint_pos=wanted[:, 6:], root_lin_vel_w=wanted[:, :3], root_ang_vel_b=wanted[:, 3:6])
+        command = (wanted[:, :2], torch.full((N, 1), 0.8), torch.zeros(N, 2), wanted[:, 5:6], wanted[:, 6:])
+        speed = 0.05 * now.joint_vel.numpy() * moving
+        body = (
+            0.25 * now.root_ang_vel_b,
+            torch.tensor([[0.1, 0.0], [0.0, -0.3]]),
+            now.joint_pos - default,
+            speed,
+            last,
+        )
+        row = np.concatenate((*command, *body), axis=1)
+        got = observer.see(now, lambda step: ref if step == 1 else None, last).numpy()  # noqa: B023
+        assert got.shape == (N, 1432)
+        assert np.allclose(got, np.concatenate((row, *past, row[:, :35]), axis=1), atol=1e-5)
+        past = [*past[1:], row]
