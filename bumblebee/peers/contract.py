@@ -16,6 +16,7 @@ from bumblebee.ranges import Name, Range, Ranged, Size, Unfit
 from bumblebee.robot.facts import WRIST_JOINTS, joint_names
 
 _KEYS = "docs/peers.md lists the fields."
+_ROUNDING = 1e-6
 Names = Annotated[tuple[Name, ...], Size(most=1000)]
 Angles = Annotated[tuple[Annotated[float, Range(least=-6.3, most=6.3)], ...], Size(most=1000)]
 Positive = Annotated[tuple[Annotated[float, Range(least=0, most=1e5)], ...], Size(most=1000)]
@@ -158,6 +159,7 @@ def read_contract(place: str | Path) -> PeerContract:
     if "input" in table:
         parts["input"] = _rows(f"{path}: input", Block, table["input"])
     contract = _made(str(path), PeerContract, table | parts)
+    _check_rates(str(path), contract)
     _check_joints(str(path), contract)
     _check_terms(str(path), contract)
     return contract
@@ -192,6 +194,13 @@ def _made(where: str, kind: type, table: Mapping[str, Any]) -> Any:
         return kind(**{name: tuple(value) if _is_list(value) else value for name, value in table.items()})
     except Unfit as error:
         raise BadInput(f"{where}: {error.where.partition('.')[2]}", error.expected, error.came, _KEYS) from None
+
+
+def _check_rates(where: str, contract: PeerContract) -> None:
+    """Refuse a physics rate of which no whole number of steps fits into a control step."""
+    physics, control = contract.physics_hz, contract.control_hz
+    if abs(physics / control - round(physics / control)) > _ROUNDING:
+        raise BadInput(f"{where}: physics_hz", f"a multiple of control_hz, {control:g}", f"{physics:g}")
 
 
 def _check_joints(where: str, contract: PeerContract) -> None:

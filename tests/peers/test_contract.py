@@ -56,6 +56,7 @@ def test_a_missing_field_is_named(tmp_path: Path, field: str):
         ({"action": {"scale": [0.5, 0.5]}}, "action.scale: expected a number, or 29, came 2"),
         ({"action": {"scale": 0.5, "gain": 2}}, "action: field gain: expected a field among scale, clip"),
         ({"action": 0.5}, "action: expected fields and values, came 0.5"),
+        ({"physics_hz": 120}, "physics_hz: expected a multiple of control_hz, 50, came 120"),
         ({"control_hz": 0}, "control_hz: expected a number from 1 to 1,000, came 0"),
         ({"groups": {"robot": [{"term": "joint_torque"}]}}, "groups.robot[0]: term: expected one of base_lin_vel"),
         ({"groups": {"robot": [{"term": "joint_pos", "axes": "xy"}]}}, "groups.robot[0]: axes: expected none"),
