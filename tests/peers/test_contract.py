@@ -1,5 +1,6 @@
 """A peer runs as its contract file says, or is refused in one line before anything runs."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ import yaml
 from bumblebee import cli
 from bumblebee.errors import BadInput
 from bumblebee.peers import CONTRACTS
-from bumblebee.peers.contract import read_contract
+from bumblebee.peers.contract import Action, Block, PeerContract, Term, read_contract
 from bumblebee.peers.policy import Peer
+from bumblebee.peers.terms import TERMS
 from bumblebee.robot.facts import joint_names
 from tests.peers.peer import JOINTS, WIDTH, table, write_contract, write_onnx
 
@@ -141,6 +143,12 @@ def test_options_of_a_peer_are_refused_for_our_own_policies(capsys, monkeypatch)
 @pytest.mark.parametrize("name", CONTRACTS)
 def test_contracts_that_come_along_can_be_read_and_name_their_file(name: str):
     assert read_contract(name).onnx_sha256 and yaml.safe_load(CONTRACTS[name].read_text())
+
+
+def test_the_page_explains_every_field_and_term():
+    page = (Path(__file__).parents[2] / "docs" / "peers.md").read_text()
+    names = [*TERMS, *(field.name for kind in (PeerContract, Action, Block, Term) for field in fields(kind))]
+    assert [name for name in names if f"`{name}`" not in page] == []
 
 
 def test_twist2_takes_1432_values():
