@@ -1,18 +1,17 @@
 """Stage distill: the experts of the final round become one generalist, in the simulator of the last round."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import pandas as pd
-import torch
-from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import action_adapter, load_delta
+from bumblebee.learning.delta.by_cluster import of_clusters
 from bumblebee.learning.distill import DistillConfig, Distiller
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import Policy, Shape, load_policy
@@ -21,15 +20,13 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
-from bumblebee.sim.engine import RobotState
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.env import ActionAdapter, TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.observations import action_scale
-from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.sampler import ClipShares
 from tasks import paths
 from tasks.sections import loop
@@ -129,28 +126,13 @@ def environment(
     return TrackingEnv(library, engine, own, config.seed, clip_share=ClipShares.equal(cluster))
 
 
-def deltas(
-    env: TrackingEnv, cluster: list[int], clusters: tuple[str, ...], final_round: int
-) -> Callable[[RobotState, Tensor, Tensor], Tensor] | None:
+def deltas(env: TrackingEnv, cluster: list[int], clusters: tuple[str, ...], final_round: int) -> ActionAdapter | None:
     """Each world's motion is run with the delta action that its cluster's expert was refined with, if any was kept."""
     if final_round == 0:
         return None
     kept = {i: load_delta(paths.delta(final_round, name)) for i, name in enumerate(clusters)}
     adapters = {i: action_adapter(delta, action_scale()) for i, delta in kept.items() if delta is not None}
-    if not adapters:
-        return None
-    of_clip = torch.as_tensor(cluster, device=env.device)
-
-    def adapt(state: RobotState, middle: Tensor, action: Tensor) -> Tensor:
-        now, changed = of_clip[env.clip], action.clone()
-        for index, adapter in adapters.items():
-            own = Rows(now == index, env.engine.by_mask)
-            if len(own):
-                part = state if own.ids is None else state[own.ids]
-                own.put(changed, adapter(part, own.of(middle), own.of(action)))
-        return changed
-
-    return adapt
+    return of_clusters(env, cluster, adapters)
 
 
 def agreement(

@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -30,22 +30,36 @@ def exported(policy: Path, folder: Path) -> Path:
 def run_on_robot(
     policy: Path, robot: Path, clips: Sequence[Clip], episodes: Sequence[Episode], base: str, judged: bool, threads: int
 ) -> list[Rollout]:
+    """One policy's measured rollouts, see `run_policies_on_robot`; the episodes' key of the policy is `KEY`."""
+    return run_policies_on_robot({KEY: policy}, robot, clips, episodes, base, judged, threads)
+
+
+def run_policies_on_robot(
+    policies: Mapping[str, Path],
+    robot: Path,
+    clips: Sequence[Clip],
+    episodes: Sequence[Episode],
+    base: str,
+    judged: bool,
+    threads: int,
+) -> list[Rollout]:
     """One measured rollout for each episode.
 
     Args:
-        policy: folder of an exported policy.
+        policies: key -> folder of an exported policy.
         robot: sealed file.
         clips: the motions that episodes name.
-        episodes: what is run; their key of the policy is `KEY`.
+        episodes: what is run.
         base: what the robot knows of its base's place, one of `stand_in.BASES`.
         judged: whether rollouts hold the true state in place of readings.
         threads: cores.
     """
     planned = [
-        {"rollout_id": e.rollout_id, "policy": KEY, "motion": e.motion, "seed": e.seed, "meta": dict(e.meta)}
+        {"rollout_id": e.rollout_id, "policy": e.policy, "motion": e.motion, "seed": e.seed, "meta": dict(e.meta)}
         for e in episodes
     ]
-    plan = {"policies": {KEY: str(policy.resolve())}, "episodes": planned, "base": base, "judged": judged}
+    folders = {key: str(folder.resolve()) for key, folder in policies.items()}
+    plan = {"policies": folders, "episodes": planned, "base": base, "judged": judged}
     with tempfile.TemporaryDirectory() as scratch:
         work = Path(scratch)
         write_library(work / "clips", list(clips))

@@ -224,12 +224,12 @@ SMALL = Study(
 """Study in seconds on two cores: it shows that every part runs, and nothing else."""
 
 
-def freeze(out: Path, study: Study, **inputs: Any) -> str:
+def freeze(out: Path, study: Any, **inputs: Any) -> str:
     """Write what the run in `out` is held to, or compare with what it began with; returns the hash of it.
 
     Args:
         out: the run's folder, made where there is none.
-        study: its settings.
+        study: its settings, a dataclass.
         inputs: plain values that results depend on beside them, such as the hash of the motions.
 
     Raises:
