@@ -63,7 +63,8 @@ class Method:
     """Source of the base's place for the robot while it is tried."""
     record_seed: int = 51_100
     """Seed of start states and sensor noise; a round has seeds of its own."""
-    delta: DeltaConfig = field(default_factory=DeltaConfig)
+    delta: DeltaConfig = field(default_factory=lambda: DeltaConfig(regression=RegressionConfig(windows=2000)))
+    """By regression, as in the demo."""
     diagnosis: DiagnosisConfig = field(
         default_factory=lambda: DiagnosisConfig(search_seconds=150.0, beyond_seconds=30.0)
     )
