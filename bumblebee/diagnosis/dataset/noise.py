@@ -59,4 +59,4 @@ def _block_powers(time: np.ndarray, readings: np.ndarray, block: int) -> np.ndar
     weights /= np.linalg.norm(weights, axis=1, keepdims=True)
     fourth = np.einsum("tk,tkd->td", weights, readings[rows])
     blocks = len(fourth) // block
-    return (fourth[: blocks * block].reshape(blocks, block, -1) ** 2).mean(axis=1)
+    return (fourth[: blocks * block].reshape(blocks, block, readings.shape[1]) ** 2).mean(axis=1)

@@ -61,3 +61,12 @@ def test_white_noise_is_found_as_it_was() -> None:
     rollout.joint_pos[:] += 3e-3 * np.random.default_rng(0).standard_normal(rollout.joint_pos.shape)
     places, _ = _noise([rollout])
     assert places == pytest.approx([3e-3] * 3, rel=0.15)
+
+
+def test_a_rollout_too_short_for_a_block_says_nothing_of_the_noise() -> None:
+    rollout = _read([0.2, 0.2, 0.2])
+    (short,) = arm.simulate({}, count=1, seconds=0.4, seed=1)
+    assert short.frames - 4 < Noise().block
+    alone, beside = _noise([rollout]), _noise([rollout, short])
+    assert np.allclose(alone, beside, rtol=0.3)
+    assert all(np.isfinite(part).all() for part in _noise([short]))
