@@ -1,4 +1,4 @@
-"""A peer's published policy and one of ours on the same motions, whole and in pieces: docs/results.md, "Beside TWIST2".
+"""A peer's published policy and one of ours on the same motions, whole and in pieces: docs/results/beside-twist2.md.
 
     python -m benchmarks.motion_pack g1_moves asap_g1 --out motions.npz
     python -m benchmarks.peers twist2_1017_20k.onnx --contract twist2 --motions motions.npz --out results/peers

@@ -25,7 +25,7 @@ def test_the_page_on_data_says_whether_the_policy_filter_is_on_by_default():
 
 def test_no_page_says_of_the_student_that_it_was_not_run_on_a_gpu():
     assert "Not run on a GPU" not in (DOCS / "training.md").read_text()
-    assert "A generalist of the experts" in (DOCS / "results.md").read_text()
+    assert "one NVIDIA H200" in (DOCS / "results" / "generalist.md").read_text()
 
 
 def test_every_test_that_a_promise_names_is_there():

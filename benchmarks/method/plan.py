@@ -81,7 +81,7 @@ class Plan:
             self._distil(arm(robot, name))
 
     def _controls(self) -> None:
-        """What has no round, by how much it is wanted."""
+        """Trainings without a round, by how much they are wanted."""
         for cluster in self.clusters:
             self._add("train", f"{LONGER}/{cluster}", [f"train {OWN}/{cluster}"], gpu=True)
         self._add("train", ONE, [f"train {BASE}"], gpu=True)

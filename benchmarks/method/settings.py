@@ -50,7 +50,7 @@ class Method:
     """Iterations of an expert in a round."""
     rounds: int = 2
     motions: int = 20
-    """Of each cluster that are recorded in a round, all where it has fewer: half to learn from, half to judge by."""
+    """Motions of each cluster that a round records, all where it has fewer: half to learn from, half to judge by."""
     repeats: int = 8
     """Recordings of each motion."""
     max_seconds: float = 8.0
