@@ -28,6 +28,7 @@ from bumblebee.learning.delta import compare
 
 ROWS = {
     "base": "base policy",
+    OWN: "experts before any round",
     GENERAL: "General Init: of the base policy",
     ONE: "one policy, the same steps",
     RANDOM: "random clusters",
@@ -93,8 +94,8 @@ def _rows(out: Path, method: Method, motions: Motions, robots: Sequence[str], di
 
 def _who(robots: Sequence[str], method: Method, distilled: bool) -> Iterator[tuple[str, str, str | None, int]]:
     """Row, folder below the run's, the robot that it is for, and that one's number."""
-    for key in (BASE, GENERAL, ONE, RANDOM, LONGER):
-        if distilled and key != BASE:
+    for key in (BASE, OWN, GENERAL, ONE, RANDOM, LONGER):
+        if distilled and key not in (BASE, OWN):
             yield key, student(key), None, 0
         elif not distilled and key != GENERAL:
             yield key, key, None, 0
@@ -154,31 +155,32 @@ def _alike(rows: pd.DataFrame, first: str, second: str) -> pd.DataFrame:
 
 
 def _rounds(out: Path, method: Method, motions: Motions, robots: Sequence[str]) -> str:
-    """Success of the experts by cluster after each round, by the rule of the own place."""
+    """Success of the experts after each round that was tried, in the own place: all motions, then by cluster."""
     after = [f"round {number}" for number in range(1, method.rounds + 1)]
-    lines = head(["robot", "correction", "cluster", "n", "round 0", *after, f"{method.rounds} less 0"])
+    lines = head(["robot", "correction", "motions", "n", "round 0", *after, "last less 0", "pelvis rule, last less 0"])
     for robot in robots:
-        first = read(out, OWN, f"sealed-{robot}", method, motions)
         for name in ARMS:
-            rounds = [
-                read(out, Place(robot, name, number).name, f"sealed-{robot}", method, motions)
-                for number in range(1, method.rounds + 1)
-            ]
-            every = [first, *rounds]
-            tables = [table.assign(arm=str(i), seed=0) for i, table in enumerate(every) if table is not None]
-            if len(tables) == len(every):
-                lines += _by_cluster(robot, name, pd.concat(tables, ignore_index=True), method.rounds)
+            line_ = [OWN, *(Place(robot, name, number).name for number in range(1, method.rounds + 1))]
+            tables = [read(out, who, f"sealed-{robot}", method, motions) for who in line_]
+            done = [table.assign(arm=str(i), seed=0) for i, table in enumerate(tables) if table is not None]
+            if len(done) > 1:
+                rows = pd.concat(done, ignore_index=True)
+                lines += [line([robot, name, *cells]) for cells in _after_rounds(rows, method.rounds)]
     return "\n".join(lines) + "\n"
 
 
-def _by_cluster(robot: str, name: str, rows: pd.DataFrame, last: int) -> list[str]:
-    lines = []
-    for cluster in [*sorted(rows["cluster"].unique()), TOGETHER]:
-        own = rows if cluster == TOGETHER else rows[rows["cluster"] == cluster]
-        cells = [robot, name, cluster, str(own["motion"].nunique())]
-        cells += [cell(rate(own[own["arm"] == str(number)], "success_local"), 2) for number in range(last + 1)]
-        lines.append(line([*cells, signed(difference(own, str(last), "0", "success_local")[0])]))
-    return lines
+def _after_rounds(rows: pd.DataFrame, rounds: int) -> Iterator[list[str]]:
+    """Cells of each set of motions; a round that was not tried has none."""
+    sets = {which: rows[rows["split"] == split] for split, which in SPLITS.items()}
+    sets |= {cluster: rows[rows["cluster"] == cluster] for cluster in sorted(rows["cluster"].unique())}
+    last = rows["arm"].max()
+    for told, own in sets.items():
+        cells = [told, str(own["motion"].nunique())]
+        for number in range(rounds + 1):
+            there = own[own["arm"] == str(number)]
+            cells.append("" if there.empty else cell(rate(there, "success_local"), 2))
+        columns = ("success_local", "success_upright")
+        yield [*cells, *(signed(difference(own, last, "0", column)[0]) for column in columns)]
 
 
 def _errors(out: Path, robots: Sequence[str]) -> str:
