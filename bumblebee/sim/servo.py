@@ -39,7 +39,7 @@ class Servos:
         bias = self.bias
         raw = self.gain * control + bias[..., 0] + bias[..., 1] * position + bias[..., 2] * velocity
         bound = self.limit if limit is None else limit
-        return np.clip(raw, -bound, bound)
+        return np.minimum(np.maximum(raw, -bound), bound)  # of few numbers `np.clip` takes twice as long
 
     def given(self, control: np.ndarray) -> np.ndarray:
         """Request (..., J) from the servos' controls: a position [rad], or a torque [N m] of a motor."""

@@ -92,14 +92,17 @@ class StepHooks:
         self._setpoint, self._pace = np.zeros((count, joints)), np.zeros((count, joints))
         terms = [term for _, _, term in hooks.terms]
         self._fading, self._running_out, self._late = hooks.has("gain"), hooks.has("limit"), hooks.has("feedback")
-        self._shaping = hooks.has("target")
+        self._shaping, self._loading = hooks.has("target"), bool(hooks.load_friction.any())
         self._rubbing = hooks.has("loss") or any(term.rubs for term in terms)
         self._driving = any(term.drives for term in terms)
+        # Of a servo that nothing here asks nothing is computed: on a small robot that costs as much as its physics.
+        self._asking = self._late or self._shaping or self._loading or bool(hooks.rotors or terms or hooks.thermal.any())
         self._pushing = self._late or self._shaping or hooks.has("torque") or any(not term.rubs for term in terms)
         fields = ["actuator_gainprm", "actuator_biasprm"] * self._fading
         fields += ["dof_frictionloss"] * self._rubbing + ["actuator_forcerange"] * self._running_out
         # Fields of the model that are written, with a row for each world.
         self._written: dict[str, np.ndarray] = {name: batch.expand(name) for name in fields}
+        self._bound = {name: batch.bind(name) for name in ("qpos", "qvel", "ctrl", "qfrc_applied")}
         self.rebase(("dof_frictionloss", "actuator_gainprm", "actuator_biasprm"))
 
     def rebase(self, fields: Iterable[str]) -> None:
@@ -120,7 +123,7 @@ class StepHooks:
         self._past_q[ids], self._past_v[ids] = q[ids][:, None], v[ids][:, None]
         if memory is not None and memory.position is not None and self._back > 0:
             self._past_q[ids], self._past_v[ids] = memory.position, memory.velocity
-        control = self.servos.controls(self._batch.bind("ctrl"))[ids]
+        control = self.servos.controls(self._bound["ctrl"])[ids]
         self._setpoint[ids], self._pace[ids] = control, 0.0
         target = self.servos.given(control)
         for k, s in enumerate(self._kept):
@@ -150,7 +153,7 @@ class StepHooks:
     @property
     def applied(self) -> np.ndarray:
         """Torque (n, J) [N m] beside MuJoCo's own servo in the last step."""
-        return self._batch.bind("qfrc_applied")[:, self.servos.dof]
+        return self._bound["qfrc_applied"][:, self.servos.dof]
 
     def state_dict(self) -> dict[str, np.ndarray]:
         """All that it remembers."""
@@ -162,26 +165,26 @@ class StepHooks:
             getattr(self, f"_{name}")[:] = saved[name]
 
     def _readings(self) -> tuple[np.ndarray, np.ndarray]:
-        return self._batch.bind("qpos")[:, self.servos.qpos], self._batch.bind("qvel")[:, self.servos.dof]
+        return self._bound["qpos"][:, self.servos.qpos], self._bound["qvel"][:, self.servos.dof]
 
     def apply(self) -> None:
         """Write everything that the next physics step needs."""
         h, servos = self._h, self.servos
         q, v = self._readings()
-        told = servos.controls(self._batch.bind("ctrl"))
+        told = servos.controls(self._bound["ctrl"])
         u = self._shaped(told) if self._shaping else told
         for k, s in enumerate(self._kept):
             self._states[:, k] = s.at(self._states[:, k], servos.given(u)[:, s.column], self._time, self._step)
         strength = self._fade() if self._fading else 1.0
         limit = self._torque_limit(v) if self._running_out else servos.limit
-        reach = limit / np.maximum(strength, 1e-9)
-        now = strength * servos.torque(q, v, told, reach)  # what MuJoCo's own servo does
-        torque = strength * servos.torque(q, v, u, reach) if self._shaping else now
-        torque = self._delayed(q, v, u, strength, limit, torque) if self._late else torque
+        now = torque = np.zeros_like(q)
+        if self._asking:
+            reach = limit / np.maximum(strength, 1e-9)
+            now = strength * servos.torque(q, v, told, reach)  # what MuJoCo's own servo does
+            torque = strength * servos.torque(q, v, u, reach) if self._shaping else now
+            torque = self._delayed(q, v, u, strength, limit, torque) if self._late else torque
         if self._rubbing:
-            share = h.load_friction[:, 0] + 0.5 * h.load_friction[:, 1] * np.tanh(v / _AT_REST)
-            extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + np.maximum(share, 0.0) * np.abs(torque)
-            loss = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
+            loss = self._loss0 + self._extra_loss(v, torque) + self._discovered(q, v, u, torque, rubs=True)
             self._written["dof_frictionloss"][:, servos.dof] = np.maximum(loss, 0.0)
         if self._pushing:
             applied = torque - now + self._discovered(q, v, u, torque, rubs=False)
@@ -193,20 +196,32 @@ class StepHooks:
                 applied[:, column] += CATALOGUE[law].torque_at(q[:, column], v[:, column], *values)
             for k, (column, amplitude, _) in enumerate(h.hysteresis):
                 applied[:, column] -= amplitude * self._bent[:, k]
-            self._batch.bind("qfrc_applied")[:, servos.dof] = applied
+            self._bound["qfrc_applied"][:, servos.dof] = applied
         for column, dof in h.rotors:
-            self._batch.bind("qfrc_applied")[:, dof] = torque[:, column]
+            self._bound["qfrc_applied"][:, dof] = torque[:, column]
         for k, (column, _, width) in enumerate(h.hysteresis):
             self._bent[:, k] = bent(self._bent[:, k], self._step * v[:, column], width)
         for k, s in enumerate(self._kept):
             self._states[:, k] = s.after(self._states[:, k], v[:, s.column], self._step)
         self._time += self._step
-        self._heat += self._step * (torque / np.where(np.isfinite(servos.limit), servos.limit, 1.0)) ** 2
+        if h.thermal.any():
+            self._heat += self._step * (torque / np.where(np.isfinite(servos.limit), servos.limit, 1.0)) ** 2
+
+    def _extra_loss(self, v: np.ndarray, torque: np.ndarray) -> np.ndarray:
+        """Dry friction (n, J) [N m] that depends on speed or load."""
+        h = self._h
+        loss = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2))
+        if self._loading:
+            share = h.load_friction[:, 0] + 0.5 * h.load_friction[:, 1] * np.tanh(v / _AT_REST)
+            loss += np.maximum(share, 0.0) * np.abs(torque)
+        return loss
 
     def _discovered(
         self, q: np.ndarray, v: np.ndarray, u: np.ndarray, torque: np.ndarray, rubs: bool, drives: bool = False
-    ) -> np.ndarray:
+    ) -> np.ndarray | float:
         """Sum (n, J) of the discovered terms that are losses, of those that act in the drive, or of other torques."""
+        if not self._h.terms:
+            return 0.0
         out = np.zeros_like(q)
         given = self.servos.given(u)
         names = self._h.joints
@@ -281,10 +296,10 @@ class StepHooks:
             wanted = strength * self.servos.torque(seen_q, seen_v, u, limit / np.maximum(strength, 1e-9))
         if not h.torque_lag.any():
             return wanted
-        self._lagged[self._fresh] = wanted[self._fresh]
+        before = np.where(self._fresh[:, None], wanted, self._lagged)
         self._fresh[:] = False
         keep = np.exp(-self._step / np.maximum(h.torque_lag, 1e-9))
-        self._lagged = keep * self._lagged + (1.0 - keep) * wanted
+        self._lagged = keep * before + (1.0 - keep) * wanted
         return np.where(h.torque_lag > 0, self._lagged, wanted)
 
     def _feedback(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
