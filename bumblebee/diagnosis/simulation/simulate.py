@@ -2,8 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import mujoco
@@ -11,20 +10,19 @@ import numpy as np
 from mujoco.batch import Batch
 
 from bumblebee.diagnosis.simulation.activations import activations
-from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
+from bumblebee.diagnosis.simulation.actuator_history import read_at
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.failures import REFUSALS
 from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
+from bumblebee.diagnosis.simulation.roll import roll
 from bumblebee.diagnosis.simulation.setpoints import follow
 from bumblebee.diagnosis.simulation.stop import check
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
 from bumblebee.errors import BadInput
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
-from bumblebee.sim.effects import Memory, StepHooks, hook_joints
-from bumblebee.sim.servo import servos_each, servos_of
 
 THREADS: int | None = None
 """Threads of every simulation; None: see `threads`."""
@@ -237,8 +235,7 @@ def _run(chunk: _Chunk, layout: Layout, inputs: list[np.ndarray]) -> np.ndarray:
             else [activations(windows, lead, inputs[0][:, 0])] * copies
         )
     set_plastic(batch, plant, windows, lead, copies)
-    path_q, path_v = _roll(batch, plant, windows, lead, control, chunk.step, copies)
-    failed = batch.warning.reshape(copies * size, -1).any(axis=1)
+    path_q, path_v, failed = roll(batch, plant, windows, chunk.chosen, control, once=chunk.starts is not None)
     at_q = at_ticks(windows, qpos, path_q, chunk.step, copies)
     at_v = at_ticks(windows, qvel, path_v, chunk.step, copies)
     for delay in np.unique(late[late > 0]):
@@ -269,8 +266,8 @@ def _led_in(plant: Plant, windows: Windows, lead: Variation, step: float) -> Kno
     control = inputs_of(early, lead, step, max(1, round(span / step)), {})
     if lead.model.na:
         batch.bind("act")[:] = activations(early, lead, control[:, 0])
-    path_q, path_v = _roll(batch, plant, early, lead, control, step, 1)
-    return path_q[:, -1], path_v[:, -1], whole & ~batch.warning.reshape(len(early), -1).any(axis=1)
+    path_q, path_v, failed = roll(batch, plant, early, [lead], control)
+    return path_q[:, -1], path_v[:, -1], whole & ~failed
 
 
 def _late(plant: Plant, lead: Variation) -> np.ndarray:
@@ -293,39 +290,6 @@ def _caught_up(
     return qpos, qvel
 
 
-def _roll(
-    batch: Batch, plant: Plant, windows: Windows, lead: Variation, control: np.ndarray, step: float, copies: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """States (n, count, nq) and (n, count, nv) after every step."""
-    hooks = lead.hooks
-    if hooks is not None:
-        condition = np.tile(windows.condition, copies)
-        servos = servos_each([servos_of(model, hook_joints(model)) for model in lead.models], condition)
-        if lead.others:
-            servos = replace(servos, supply=np.array([p.condition.supply for p in plant.every])[condition, None])
-        running = StepHooks(hooks, lead.model, batch, servos)
-        running.reset(np.arange(len(control)), _repeated(remember(plant, windows, hooks, step), copies))
-    if hooks is None or not hooks.each_step:
-        out = batch.rollout(control.shape[1], control, record=("qpos", "qvel"))
-        return out["qpos"], out["qvel"]
-    q, v, ctrl = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
-    path_q = np.empty((len(q), control.shape[1], q.shape[1]))
-    path_v = np.empty((len(v), control.shape[1], v.shape[1]))
-    for k in range(control.shape[1]):
-        ctrl[:] = control[:, k]
-        running.apply()
-        batch.step()
-        path_q[:, k], path_v[:, k] = q, v
-    return path_q, path_v
-
-
-def _repeated(memory: Memory, copies: int) -> Memory:
-    """The memory of every window, once for each copy of the windows."""
-    values = {f.name: getattr(memory, f.name) for f in fields(memory)}
-    more: dict[str, Any] = {k: None if v is None else np.concatenate([v] * copies) for k, v in values.items()}
-    return Memory(**more)
-
-
 def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Starts whose base stands as it is, not as a tilted sensor says; velocities in the base's frame stay."""
     qpos, qvel = qpos.copy(), qvel.copy()
@@ -339,10 +303,14 @@ def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray)
 def with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:
     """The model itself, its step set: variations are never stepped from two places at once.
 
-    A robot is one island of constraints: looking for others costs a tenth of a step and changes nothing.
+    A robot is one island of constraints: looking for others costs a tenth of a step and changes nothing. Nobody reads
+    sensors, and without shapes nothing touches.
     """
+    off = mujoco.mjtDisableBit
     model.opt.timestep = step
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    model.opt.disableflags |= int(off.mjDSBL_ISLAND) | int(off.mjDSBL_SENSOR)
+    if not model.ngeom + model.nflex:
+        model.opt.disableflags |= int(off.mjDSBL_CONTACT)
     return model
 
 

@@ -95,8 +95,10 @@ class StepHooks:
         self._shaping, self._loading = hooks.has("target"), bool(hooks.load_friction.any())
         self._rubbing = hooks.has("loss") or any(term.rubs for term in terms)
         self._driving = any(term.drives for term in terms)
-        # Of a servo that nothing here asks nothing is computed: on a small robot that costs as much as its physics.
-        self._asking = self._late or self._shaping or self._loading or bool(hooks.rotors or terms or hooks.thermal.any())
+        # A servo that nothing here asks for is not computed: on a small robot it costs as much as the physics.
+        self._asking = (
+            self._late or self._shaping or self._loading or bool(hooks.rotors or terms or hooks.thermal.any())
+        )
         self._pushing = self._late or self._shaping or hooks.has("torque") or any(not term.rubs for term in terms)
         fields = ["actuator_gainprm", "actuator_biasprm"] * self._fading
         fields += ["dof_frictionloss"] * self._rubbing + ["actuator_forcerange"] * self._running_out
