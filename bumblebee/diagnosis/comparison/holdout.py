@@ -30,6 +30,8 @@ class Holdout:
     last: Windows | None = None
     """More of these, on which the last fit must not be worse: one window in a hundred may be where it goes wrong."""
     recall: Recall = field(default_factory=Recall, repr=False)
+    """Errors of models on the windows `long`, and on the windows `last`."""
+    recall_last: Recall = field(default_factory=Recall, repr=False)
 
     @property
     def judge(self) -> Problem:
@@ -51,7 +53,9 @@ class Holdout:
 
     def widely(self) -> "Holdout":
         """Validation windows that are also after 1 s all windows that there are for the last fit."""
-        return self if self.last is None or self.last is self.long else Holdout(self.problem, self.last, self.last)
+        if self.last is None or self.last is self.long:
+            return self
+        return Holdout(self.problem, self.last, self.last, self.recall_last, self.recall_last)
 
     def _with(self, problem: Problem) -> "Holdout":
         """Validation windows of another problem; what is known of the declared model after 1 s stays known."""

@@ -38,14 +38,16 @@ def without(models: Sequence[mujoco.MjModel], geoms: np.ndarray) -> Iterator[Non
 
 
 def _found(plant: Plant, windows: Windows) -> np.ndarray:
-    model, data, rule = plant.model, mujoco.MjData(plant.model), plant.thresholds.culling
+    model, rule = plant.model, plant.thresholds.culling
     moving = [g for g in range(model.ngeom) if touches(model, g)]
     fixed = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == 0 and _collides(model, g)]
     some = [g for g in moving if not any(_meet(model, g, other) for other in moving if other != g)]
     some = [g for g in some if g not in (*model.pair_geom1, *model.pair_geom2)]
+    if not some:
+        return np.empty(0, dtype=int)
+    data, plane = mujoco.MjData(model), int(mujoco.mjtGeom.mjGEOM_PLANE)
     mujoco.mj_kinematics(model, data)
-    plane = int(mujoco.mjtGeom.mjGEOM_PLANE)
-    if not some or not all(model.geom_type[g] == plane and data.geom_xmat[g, 8] > 1 - rule.level for g in fixed):
+    if not all(model.geom_type[g] == plane and data.geom_xmat[g, 8] > 1 - rule.level for g in fixed):
         return np.empty(0, dtype=int)
     floor = max((data.geom_xpos[g, 2] for g in fixed), default=-np.inf)
     clear = np.full(len(some), np.inf)

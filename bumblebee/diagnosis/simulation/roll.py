@@ -6,12 +6,14 @@ own. A path is known again by all that it follows from, to the bit: model, state
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import mujoco
 import numpy as np
 from mujoco.batch import MODEL_FIELDS, Batch
 
@@ -23,8 +25,6 @@ from bumblebee.sim.effects import Memory, RuntimeHooks, StepHooks, hook_joints
 from bumblebee.sim.servo import servos_each, servos_of
 
 _KEPT_BYTES = 64e6
-_CONTENT = [attrgetter(name) for name in sorted(MODEL_FIELDS)]
-"""All of a model but its assets (meshes, height fields), which are a plant's own."""
 
 Rolled = tuple[np.ndarray, np.ndarray, np.ndarray]
 """States (n, K, nq) and (n, K, nv) after every step, and which of the n failed (n,)."""
@@ -61,9 +61,13 @@ def roll(
         return _stepped(batch, running, control, every)
     paths = _known.setdefault(plant, _Paths())
     parts = [slice(k * size, (k + 1) * size) for k in range(len(chosen))]
-    keys = [_key(batch, windows, v, control, part, running) for v, part in zip(chosen, parts, strict=True)]
+    given = [(v, (windows.condition, batch.state[part], control[part])) for v, part in zip(chosen, parts, strict=True)]
+    keys = [_key(v, v.plant or plant, arrays, running) for v, arrays in given]
     found = {key: paths.kept[key] for key in keys if key in paths.kept}
-    new = {key: part for key, part in zip(keys, parts, strict=True) if key not in found}
+    new: dict[bytes, slice] = {}
+    for key, part in zip(keys, parts, strict=True):
+        if key not in found:
+            new.setdefault(key, part)
     if new:
         made = _stepped(batch, running, control, np.concatenate([every[part] for part in new.values()]))
         for key, part in zip(new, parts, strict=False):
@@ -114,19 +118,22 @@ def _repeated(memory: Memory, copies: int) -> Memory:
     return Memory(**more)
 
 
-def _key(
-    batch: Batch, windows: Windows, variation: Variation, control: np.ndarray, part: slice, running: StepHooks | None
-) -> bytes:
-    """All that the paths of the windows in a part of a batch follow from, as a hash."""
+def _key(variation: Variation, own: Plant, given: Sequence[np.ndarray], running: StepHooks | None) -> bytes:
+    """All that the paths of some windows follow from, as a hash: a model of the plant `own`, hooks, what is `given`."""
     made = hashlib.sha1(usedforsecurity=False)
-    given = [content(model) for model in variation.models for content in _CONTENT]
-    given += [windows.condition, batch.state[part], control[part]]
+    arrays = [*(values for model in variation.models for values in _content(own)(model)), *given]
     if running is not None and variation.hooks is not None:
-        given += running.state_dict().values()
+        arrays += running.state_dict().values()
         made.update(_words(variation.hooks))
-    for values in given:
+    for values in arrays:
         made.update(np.ascontiguousarray(values))
     return made.digest()
+
+
+@lru_cache(maxsize=64)
+def _content(own: Plant) -> Callable[[mujoco.MjModel], tuple[Any, ...]]:
+    """What gives all of a plant's model but its assets (meshes, height fields), which are the plant's own."""
+    return attrgetter(*(name for name in sorted(MODEL_FIELDS) if np.size(attrgetter(name)(own.model))))
 
 
 def _words(hooks: RuntimeHooks) -> bytes:

@@ -45,7 +45,7 @@ def test_the_share_of_largest_likelihood_is_that_of_the_patterns() -> None:
     logs = np.full((200, 16), -1e3)
     logs[np.arange(200), index] = 0.0
     losses = LossLikelihoods(patterns, logs - logs[:, :1])
-    share = losses.best()
+    share = losses.best
     assert share == pytest.approx(true.mean(), rel=1e-6)
     assert (losses.likely(share) == true).all()
     low, high = losses.interval(share)

@@ -11,6 +11,7 @@ really got, and the rest of the diagnosis goes on with that.
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import logsumexp
@@ -21,7 +22,7 @@ from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.changes import Asking, Loss, Lost
 from bumblebee.diagnosis.selection.proposals.setpoints import explains_more
 from bumblebee.diagnosis.selection.state import SearchState
-from bumblebee.diagnosis.simulation import Windows, residuals, vary
+from bumblebee.diagnosis.simulation import Windows, residuals, select, vary
 from bumblebee.diagnosis.thresholds.proposals import PacketLoss
 from bumblebee.sim.effects import Effect
 
@@ -45,12 +46,15 @@ class LossLikelihoods:
         """Log-likelihood of a share, summed over windows."""
         return float(logsumexp(self.logs + self._prior(share), axis=1).sum())
 
+    @cached_property
     def best(self) -> float:
         """The share of largest likelihood, by expectation and maximisation."""
         lost, share = self.patterns.sum(axis=1), self.rule.first_share
         for _ in range(self.rule.iterations):
-            weights = self._weights(share)
+            before, weights = share, self._weights(share)
             share = float(np.clip((weights @ lost).mean() / self.patterns.shape[1], 1e-6, 0.9))
+            if share == before:
+                break
         return share
 
     def interval(self, share: float) -> tuple[float, float]:
@@ -85,13 +89,13 @@ def packet_loss_of(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, 
     if not places:
         return None
     tried = [(loss_likelihoods(problem, fit.effects, clean, place), place) for place in places]
-    gains = [losses.total(losses.best()) for losses, _ in tried]
+    gains = [losses.total(losses.best) for losses, _ in tried]
     best = int(np.argmax(gains))
     place, least = tried[best][1], rule.least_gain + np.log(len(places))
     if gains[best] < least:
         return None
     losses, fit, clean = _settled(problem, fit, tried[best][0], place)
-    share = losses.best()
+    share = losses.best
     gain = losses.total(share)
     lost = losses.likely(share)
     if gain < least or not lost.any():
@@ -123,7 +127,7 @@ def _settled(
     bare = replace(rest, nuisance=0.0 * fit.nuisance, residual=problem.residual([rest.effects])[0])
     known = loss_likelihoods(problem, bare.effects, bare.clean(problem), place, changes)
     ends = [_arriving(problem, *start, place) for start in ((fit, losses), (bare, known))]
-    return min(ends, key=lambda end: end[1].cost + 2.0 * end[0].price(end[0].best()))
+    return min(ends, key=lambda end: end[1].cost + 2.0 * end[0].price(end[0].best))
 
 
 def _arriving(
@@ -132,13 +136,13 @@ def _arriving(
     """Fit and commands that arrived, found in turn."""
     rule, clean = problem.thresholds.selection.proposals.packet_loss, fit.clean(problem)
     for _ in range(rule.rounds):
-        kept = arrived(problem, losses.likely(losses.best()), place)
+        kept = arrived(problem, losses.likely(losses.best), place)
         residual = kept.residual([fit.effects])[0]
         weights = window_weights(residual - np.tensordot(fit.nuisance, kept.nuisance, axes=1))
         fit = gauss_newton(kept, fit.chosen, fit.values, weights, iterations=1, coarse=True)
         clean = problem.residual([fit.effects])[0] - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
         losses = loss_likelihoods(problem, fit.effects, clean, place, losses.changes)
-        fit = replace(fit, cost=float((_clean(arrived(problem, losses.likely(losses.best()), place), fit) ** 2).sum()))
+        fit = replace(fit, cost=float((_clean(arrived(problem, losses.likely(losses.best), place), fit) ** 2).sum()))
     return losses, fit, clean
 
 
@@ -156,7 +160,7 @@ def _places(problem: Problem, fit: Fit, clean: np.ndarray) -> list[str]:
     if odd.size < rule.few_odd * len(power):
         some = problem.part(odd)  # what these do not show at all the others need not be simulated for
         seen = [loss_likelihoods(some, fit.effects, clean[odd], place) for place in places]
-        if max(losses.total(losses.best()) for losses in seen) < rule.hint:
+        if max(losses.total(losses.best) for losses in seen) < rule.hint:
             return []
     return places
 
@@ -218,11 +222,16 @@ def _changes(problem: Problem, effects: Sequence[Effect], place: str, ticks: int
     variation = [vary(problem.plant, effects)]
     step = problem.coarse
 
+    usual = residuals(problem.plant, problem.layout, windows, variation, step)[0]
+
     def simulate(command: np.ndarray) -> np.ndarray:
-        raw = residuals(problem.plant, problem.layout, replace(windows, command=command), variation, step)[0]
+        raw, others = usual.copy(), (command != windows.command).any(axis=(1, 2))
+        if others.any():
+            some = select(replace(windows, command=command), others)
+            raw[others] = residuals(problem.plant, problem.layout, some, variation, step)[0]
         return problem.whitener(raw, centre=False)
 
-    base = simulate(windows.command)
+    base = problem.whitener(usual, centre=False)
     out = np.zeros((longest, ticks, *base.shape), dtype=np.float32)
     for length, t in itertools.product(range(1, longest + 1), range(ticks)):
         command = windows.command.copy()
