@@ -33,6 +33,7 @@ GROUND = {"config", "budget"}  # modules that every room may import
 NO_THRESHOLDS = {
     "simulation/cache.py": {"_KEPT_BYTES"},  # memory
     "simulation/first_order.py": {"_FORGOTTEN"},  # rounding
+    "simulation/roll.py": {"_KEPT_BYTES"},  # memory
     "simulation/setpoints.py": {"_BYTES"},  # memory
     "simulation/simulate.py": {"_MOST_THREADS", "_CHUNK_BYTES", "_KEPT"},  # threads and memory
     "simulation/units.py": {"MEASURES"},  # factors of units

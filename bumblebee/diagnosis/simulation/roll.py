@@ -126,13 +126,13 @@ def _key(variation: Variation, own: Plant, given: Sequence[np.ndarray], running:
         arrays += running.state_dict().values()
         made.update(_words(variation.hooks))
     for values in arrays:
-        made.update(np.ascontiguousarray(values))
+        made.update(np.ascontiguousarray(values).data)
     return made.digest()
 
 
 @lru_cache(maxsize=64)
 def _content(own: Plant) -> Callable[[mujoco.MjModel], tuple[Any, ...]]:
-    """What gives all of a plant's model but its assets (meshes, height fields), which are the plant's own."""
+    """Getter of all of a model but its assets (meshes, height fields), which are the plant's own."""
     return attrgetter(*(name for name in sorted(MODEL_FIELDS) if np.size(attrgetter(name)(own.model))))
 
 

@@ -96,9 +96,8 @@ class StepHooks:
         self._rubbing = hooks.has("loss") or any(term.rubs for term in terms)
         self._driving = any(term.drives for term in terms)
         # A servo that nothing here asks for is not computed: on a small robot it costs as much as the physics.
-        self._asking = (
-            self._late or self._shaping or self._loading or bool(hooks.rotors or terms or hooks.thermal.any())
-        )
+        self._heating = bool(hooks.thermal.any())
+        self._asking = self._late or self._shaping or self._loading or self._heating or bool(hooks.rotors or terms)
         self._pushing = self._late or self._shaping or hooks.has("torque") or any(not term.rubs for term in terms)
         fields = ["actuator_gainprm", "actuator_biasprm"] * self._fading
         fields += ["dof_frictionloss"] * self._rubbing + ["actuator_forcerange"] * self._running_out
@@ -206,7 +205,7 @@ class StepHooks:
         for k, s in enumerate(self._kept):
             self._states[:, k] = s.after(self._states[:, k], v[:, s.column], self._step)
         self._time += self._step
-        if h.thermal.any():
+        if self._heating:
             self._heat += self._step * (torque / np.where(np.isfinite(servos.limit), servos.limit, 1.0)) ** 2
 
     def _extra_loss(self, v: np.ndarray, torque: np.ndarray) -> np.ndarray:
