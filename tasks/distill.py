@@ -10,8 +10,7 @@ import mujoco
 import pandas as pd
 
 from bumblebee.errors import BadInput
-from bumblebee.learning.delta import action_adapter, load_delta
-from bumblebee.learning.delta.by_cluster import of_clusters
+from bumblebee.learning.delta import action_adapter, load_delta, of_clusters
 from bumblebee.learning.distill import DistillConfig, Distiller
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import Policy, Shape, load_policy

@@ -7,8 +7,7 @@ from benchmarks.study.settings import Distilling
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.delta import DeltaConfig
-from bumblebee.learning.delta.action import RegressionConfig
+from bumblebee.learning.delta import DeltaConfig, RegressionConfig
 from bumblebee.learning.learners import Config
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.tracking.config import EnvConfig

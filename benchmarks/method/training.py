@@ -12,7 +12,7 @@ from benchmarks.method.settings import Method, iterations
 from benchmarks.study.correction import DECLARED, Correction
 from benchmarks.study.motions import Motions
 from bumblebee.io.write import write_file
-from bumblebee.learning.delta.by_cluster import of_clusters
+from bumblebee.learning.delta import of_clusters
 from bumblebee.learning.distill import CHECKPOINT as DISTILLING
 from bumblebee.learning.distill import DistillConfig, Distiller
 from bumblebee.learning.learner import CHECKPOINT, Learner

@@ -5,12 +5,14 @@ from bumblebee.learning.delta.action import (
     DELTA_PPO,
     DeltaAction,
     DeltaConfig,
+    RegressionConfig,
     action_adapter,
     load_delta,
     magnitudes,
     make_network,
     save_delta,
 )
+from bumblebee.learning.delta.by_cluster import of_clusters
 from bumblebee.learning.delta.env import DeltaEnv
 from bumblebee.learning.delta.gain import Gain, by_rollout, compare, replay_error, state_error
 from bumblebee.learning.delta.learn import learn_delta, total_frames
@@ -26,6 +28,7 @@ __all__ = [
     "DeltaEnv",
     "Gain",
     "Recordings",
+    "RegressionConfig",
     "action_adapter",
     "by_rollout",
     "compare",
@@ -34,6 +37,7 @@ __all__ = [
     "load_delta",
     "magnitudes",
     "make_network",
+    "of_clusters",
     "recorded_state",
     "replay_error",
     "save_delta",
