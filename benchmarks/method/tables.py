@@ -123,7 +123,7 @@ def _methods(rows: pd.DataFrame) -> str:
 def _pairs(rows: pd.DataFrame) -> str:
     """Rows less others, where both were tried on the same motions and robots."""
     pairs = [(WHOLE, key) for key in ROWS if key != WHOLE]
-    pairs += [("physics", LONGER), ("both", "physics"), (LONGER, ONE), (LONGER, RANDOM)]
+    pairs += [(OWN, BASE), ("physics", LONGER), ("both", "physics"), (LONGER, ONE), (LONGER, RANDOM)]
     lines = head(["difference", "motions", *RATES.values(), "p, own place"])
     for split, which in SPLITS.items():
         own = rows[rows["split"] == split]
