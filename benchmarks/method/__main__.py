@@ -8,13 +8,14 @@ import torch
 
 import benchmarks.method
 from benchmarks.method.on_robot import recorded_motions
-from benchmarks.method.plan import Plan
+from benchmarks.method.plan import DONE, Plan
 from benchmarks.method.settings import NAMED, Method
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.settings import freeze
 from benchmarks.study.steps import Places, Runner, Step
 from bumblebee.deploy.stand_in_effects import read_sealed
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.errors import BadInput
+from bumblebee.last_line import guarded
 
 LATER = "the call is over: the same command goes on"
 
@@ -25,8 +26,10 @@ def run(options: argparse.Namespace) -> None:
     gpus = options.gpus if method.env.engine == "mujoco_warp" else 0
     steps = begun(options, method, motions)
     wanted = [step for step in steps if options.only is None or step.name.split()[0] in options.only]
-    if gpus > torch.cuda.device_count() and any(step.gpu for step in wanted):
-        raise BadInput("--gpus", f"at most {torch.cuda.device_count()} GPUs of this machine", str(gpus))
+    there = torch.cuda.device_count()
+    if method.env.engine == "mujoco_warp" and not 1 <= gpus <= there and any(step.gpu for step in wanted):
+        expected = f"1 to {there} GPUs of this machine" if there else "a machine with a GPU"
+        raise BadInput("--gpus", expected, str(gpus), "`--only` does what needs none.")
     seconds = None if options.minutes is None else 60 * options.minutes
     runner = Runner(wanted, Places(gpus, options.each, options.jobs), options.out / "logs", seconds)
     whole = runner.run({step.name for step in steps if step.done.exists()})
@@ -92,7 +95,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     own.add_argument("--each", type=int, default=2, help="trainings beside each other on a GPU")
     own.add_argument("--jobs", type=int, default=2, help="processor cores for everything else")
     own.add_argument("--minutes", type=float, help="end this call after so long")
-    own.add_argument("--only", nargs="+", metavar="KIND", help="these kinds of steps alone, as record diagnosis")
+    own.add_argument("--only", nargs="+", choices=DONE, help="these kinds of steps alone")
     own.add_argument("--out", type=Path, required=True)
     own.set_defaults(work=run)
     table = commands.add_parser("table", help="the tables of a run")
@@ -109,11 +112,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 def main(arguments: list[str] | None = None) -> None:
     """Run a command; bad input is one line and status 2."""
     options = parse(arguments)
-    try:
-        options.work(options)
-    except BadInput as error:
-        print(error)
-        raise SystemExit(EXIT_BAD_INPUT) from None
+    raise SystemExit(guarded(lambda: options.work(options)))
 
 
 if __name__ == "__main__":

@@ -15,9 +15,9 @@ from benchmarks.study.tables import (
     SPLITS,
     cell,
     difference,
-    estimate,
     head,
     line,
+    methods_table,
     motions_of,
     rate,
     relative,
@@ -51,7 +51,7 @@ def method_tables(out: Path, method: Method, motions: Motions, robots: Path | No
         for robot in ("declared", "drawn", SEALED):
             own = rows[rows["on"] == robot]
             if not own.empty:
-                parts.append(f"### {what}, {robot} robots\n\n{_methods(own)}\n{_pairs(own)}")
+                parts.append(f"### {what}, {robot} robots\n\n{methods_table(own, ROWS, 'row')}\n{_pairs(own)}")
     if names:
         parts.append(
             f"### Experts by cluster after each round, sealed robots\n\n{_rounds(out, method, motions, names)}"
@@ -59,7 +59,7 @@ def method_tables(out: Path, method: Method, motions: Motions, robots: Path | No
         parts.append(f"### Recordings that judge, replayed: error after 0.2 and 1 s\n\n{_errors(out, names)}")
         parts.append(f"### What the delta actions do, mean absolute correction [rad]\n\n{_magnitudes(out, names)}")
     if names and robots is not None:
-        parts.append(f"### What diagnoses found, and what was sealed\n\n{_found(out, method, names, robots)}")
+        parts.append(f"### What diagnoses found, and what was sealed\n\n{_found(out, names, robots)}")
     return "\n".join(parts)
 
 
@@ -105,21 +105,6 @@ def _who(robots: Sequence[str], method: Method, distilled: bool) -> Iterator[tup
             yield name, student(line_) if distilled else Place(robot, name, method.rounds).name, robot, index
 
 
-def _methods(rows: pd.DataFrame) -> str:
-    errors = ["MPJPE [rad]", "MPKPE [mm]", "MPKPE, own place [mm]"]
-    lines = head(["row", "motions", "n", *RATES.values(), *errors])
-    for split, which in SPLITS.items():
-        for key, told in ROWS.items():
-            own = rows[(rows["arm"] == key) & (rows["split"] == split)]
-            if own.empty:
-                continue
-            cells = [told, which, str(own["motion"].nunique()), *(cell(rate(own, column), 2) for column in RATES)]
-            cells += [cell(estimate(own, "mpjpe_rad"), 3)]
-            cells += [cell(estimate(own, column), 0) for column in ("mpkpe_mm", "mpkpe_local_mm")]
-            lines.append(line(cells))
-    return "\n".join(lines) + "\n"
-
-
 def _pairs(rows: pd.DataFrame) -> str:
     """Rows less others, where both were tried on the same motions and robots."""
     pairs = [(WHOLE, key) for key in ROWS if key != WHOLE]
@@ -135,7 +120,7 @@ def _pairs(rows: pd.DataFrame) -> str:
             told = f"{_plain(first)} less {_plain(second)}"
             values = [signed(value) for value, _ in each.values()]
             lines.append(line([told, which, *values, f"{each['success_local'][1]:.3g}"]))
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" if len(lines) > len(head([])) else ""
 
 
 def _alike(rows: pd.DataFrame, first: str, second: str) -> pd.DataFrame:
@@ -146,8 +131,8 @@ def _alike(rows: pd.DataFrame, first: str, second: str) -> pd.DataFrame:
         return rows.iloc[:0]
     seeds = sorted({*one["seed"], *other["seed"]})
     one, other = (
-        pd.concat([each.assign(seed=seed) for seed in seeds]) if each["seed"].nunique() == 1 else each
-        for each in (one, other)
+        each if key in ARMS else pd.concat([each.assign(seed=seed) for seed in seeds])
+        for key, each in ((first, one), (second, other))
     )
     shared = one.set_index(keys).index.intersection(other.set_index(keys).index)
     both = pd.concat([one, other])
@@ -163,7 +148,7 @@ def _rounds(out: Path, method: Method, motions: Motions, robots: Sequence[str]) 
             line_ = [OWN, *(Place(robot, name, number).name for number in range(1, method.rounds + 1))]
             tables = [read(out, who, f"sealed-{robot}", method, motions) for who in line_]
             done = [table.assign(arm=str(i), seed=0) for i, table in enumerate(tables) if table is not None]
-            if len(done) > 1:
+            if tables[0] is not None and len(done) > 1:
                 rows = pd.concat(done, ignore_index=True)
                 lines += [line([robot, name, *cells]) for cells in _after_rounds(rows, method.rounds)]
     return "\n".join(lines) + "\n"
@@ -225,7 +210,7 @@ def _magnitudes(out: Path, robots: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _found(out: Path, method: Method, names: Sequence[str], robots: Path) -> str:
+def _found(out: Path, names: Sequence[str], robots: Path) -> str:
     lines = head(["robot", "sealed", "arm", "round", "found"])
     for robot in names:
         sealed = ", ".join(sorted(str(row["effect"]) for row in read_sealed(robots / f"{robot}.json"))) or "nothing"

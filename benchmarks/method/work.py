@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from benchmarks.method.on_robot import OnRobot
+from benchmarks.method.plan import DONE
 from benchmarks.method.settings import NAMED
 from benchmarks.method.training import Training
 from benchmarks.method.trying import Trying
@@ -38,8 +39,7 @@ def do(options: argparse.Namespace) -> bool:
 def main() -> None:
     """Do one step; exit code 3: not done when the time was over."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    kinds = ("train", "distil", "record", "diagnosis", "delta", "errors", "tried", "sealed")
-    parser.add_argument("kind", choices=kinds)
+    parser.add_argument("kind", choices=DONE)
     parser.add_argument("where", help="folder below --out")
     parser.add_argument("--settings", choices=NAMED, required=True)
     parser.add_argument("--motions", type=Path, required=True)

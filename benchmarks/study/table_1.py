@@ -7,13 +7,14 @@ import pandas as pd
 from benchmarks.study.jobs import MORE_GENERALISTS, OTHERS, arm_of, teacher_of
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
-from benchmarks.study.tables import RATES, SPLITS, cell, difference, estimate, head, line, rate, read_trials, signed
+from benchmarks.study.tables import RATES, SPLITS, difference, head, line, methods_table, read_trials, signed
 from benchmarks.study.trying import SEALED_TRIALS, TRIALS
 from bumblebee.errors import BadInput
 
 OURS = "transformer"
 STUDENTS = {OURS: "BumbleBee: transformer, of the experts by cluster", **MORE_GENERALISTS, **OTHERS}
 TEACHERS = {name: f"{told}'s teacher, which sees the simulator" for name, told in OTHERS.items()}
+NAMES = STUDENTS | {f"{name}-teacher": told for name, told in TEACHERS.items()}
 
 
 def table_1_tables(out: Path, study: Study, motions: Motions) -> str:
@@ -65,23 +66,7 @@ def read_sealed(folder: Path, motions: Motions) -> pd.DataFrame:
 
 def _of_robot(every: pd.DataFrame, robot: str, told: str = "") -> str:
     rows = every[every["robot"] == robot]
-    return f"### {told}{robot} robot\n\n{_methods(rows)}\n{_pairs(rows)}"
-
-
-def _methods(rows: pd.DataFrame) -> str:
-    errors = ["MPJPE [rad]", "MPKPE [mm]", "MPKPE, own place [mm]"]
-    lines = head(["method", "motions", "n", *RATES.values(), *errors])
-    names = STUDENTS | {f"{name}-teacher": told for name, told in TEACHERS.items()}
-    for split, which in SPLITS.items():
-        for arm, told in names.items():
-            own = rows[(rows["arm"] == arm) & (rows["split"] == split)]
-            if own.empty:
-                continue
-            cells = [told, which, str(own["motion"].nunique()), *(cell(rate(own, column), 2) for column in RATES)]
-            cells += [cell(estimate(own, "mpjpe_rad"), 3)]
-            cells += [cell(estimate(own, column), 0) for column in ("mpkpe_mm", "mpkpe_local_mm")]
-            lines.append(line(cells))
-    return "\n".join(lines) + "\n"
+    return f"### {told}{robot} robot\n\n{methods_table(rows, NAMES, 'method')}\n{_pairs(rows)}"
 
 
 def _pairs(rows: pd.DataFrame) -> str:

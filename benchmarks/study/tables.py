@@ -1,6 +1,6 @@
 """Experts against one policy: what their trials say, paired by motion, with intervals over motions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -178,6 +178,27 @@ def _cross_table(arms: Arms, motions: Motions) -> str:
 def _present(rows: pd.DataFrame) -> dict[str, str]:
     """The arms that were tried, with their names; a run of before an arm was thought of lacks it."""
     return {arm: name for arm, name in ARMS.items() if (rows["arm"] == arm).any()}
+
+
+def methods_table(rows: pd.DataFrame, names: Mapping[str, str], title: str) -> str:
+    """A row for each arm that was tried and split: success by three rules, and errors until the loss.
+
+    Args:
+        rows: trials, the arm of each in `arm`.
+        names: arm -> its name in the table, in order.
+        title: head of the first column.
+    """
+    lines = head([title, "motions", "n", *RATES.values(), "MPJPE [rad]", "MPKPE [mm]", "MPKPE, own place [mm]"])
+    for split, which in SPLITS.items():
+        for arm, told in names.items():
+            own = rows[(rows["arm"] == arm) & (rows["split"] == split)]
+            if own.empty:
+                continue
+            cells = [told, which, str(own["motion"].nunique()), *(cell(rate(own, column), 2) for column in RATES)]
+            cells += [cell(estimate(own, "mpjpe_rad"), 3)]
+            cells += [cell(estimate(own, column), 0) for column in ("mpkpe_mm", "mpkpe_local_mm")]
+            lines.append(line(cells))
+    return "\n".join(lines) + "\n"
 
 
 def head(cells: Sequence[str]) -> list[str]:

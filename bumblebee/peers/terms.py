@@ -66,4 +66,4 @@ TERMS: dict[str, TermKind] = {
     "reference_joint_pos_from_default": TermKind(0, lambda seen: seen.ref.joint_pos - seen.default_pos),
     "reference_joint_vel": TermKind(0, lambda seen: seen.ref.joint_vel),
 }
-"""Name -> term. A term is added here, with a test in tests/peers/test_terms.py and a line in docs/peers.md."""
+"""Name -> term. A term is added here, with a test in tests/peers/test_observer.py and a line in docs/peers.md."""

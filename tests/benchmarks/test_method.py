@@ -16,7 +16,7 @@ from benchmarks.method.on_robot import OnRobot, recorded_motions
 from benchmarks.method.places import ARMS, BASE, GENERAL, LONGER, ONE, OWN, RANDOM, Place, experts, student
 from benchmarks.method.plan import Plan
 from benchmarks.method.settings import NAMED, SMALL, Method
-from benchmarks.method.tables import method_tables
+from benchmarks.method.tables import _alike, method_tables
 from benchmarks.method.training import Training, correction
 from benchmarks.method.trying import Experts
 from benchmarks.study.motions import read_motions
@@ -111,6 +111,18 @@ def test_experts_side_by_side_each_move_the_robots_of_their_own_motions() -> Non
     actions = Experts([first, second], [1, 0, 1]).follower()(seen)
     assert torch.allclose(actions[1], first(seen[1:2])[0], atol=1e-6)
     assert torch.allclose(actions[[0, 2]], second(seen[[0, 2]]), atol=1e-6)
+
+
+def test_a_row_for_one_robot_stands_beside_that_robots_rows_and_a_control_beside_all() -> None:
+    tried = [("delta", 0), ("physics", 0), ("physics", 1), (LONGER, 0)]
+    rows = pd.DataFrame([(arm, seed, "drawn", name) for arm, seed in tried for name in "ab"])
+    rows.columns = ["arm", "seed", "robot", "name"]
+    assert set(_alike(rows, "delta", "physics")["seed"]) == {0}
+    assert _alike(rows, "physics", LONGER).groupby("arm")["seed"].agg(set).to_dict() == {
+        "physics": {0, 1},
+        LONGER: {0, 1},
+    }
+    assert _alike(rows, "both", LONGER).empty
 
 
 def test_no_sealed_robot_is_one_line(folder: Path, tmp_path: Path) -> None:

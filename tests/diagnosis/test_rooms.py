@@ -55,7 +55,7 @@ NO_THRESHOLDS = {
     "simulation/actuators.py": {"_FEEDBACK"},
     "simulation/hidden_states.py": {"_LEAD_ERROR"},
     "simulation/windows.py": {"_LEAD_SHARE", "_BRIEF"},
-    "selection/proposals/packet_loss.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile
+    "selection/proposals/loss_likelihoods.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile
 }
 
 

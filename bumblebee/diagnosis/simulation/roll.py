@@ -8,7 +8,6 @@ import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
 from operator import attrgetter
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -39,13 +38,16 @@ class _Paths:
     """Bytes."""
 
     def add(self, key: bytes, path: Rolled) -> None:
-        """Keep a path as long as there is room."""
+        """Keep a path as long as there is room; whoever asked for it must not write to it."""
+        for values in path:
+            values.flags.writeable = False
         self.kept[key], self.size = path, self.size + _bytes(path)
         while self.size > _KEPT_BYTES:
             self.size -= _bytes(self.kept.popitem(last=False)[1])
 
 
 _known: WeakKeyDictionary[Plant, _Paths] = WeakKeyDictionary()
+_contents: WeakKeyDictionary[Plant, Callable[[mujoco.MjModel], tuple[Any, ...]]] = WeakKeyDictionary()
 
 
 def roll(
@@ -120,7 +122,7 @@ def _repeated(memory: Memory, copies: int) -> Memory:
 
 def _key(variation: Variation, own: Plant, given: Sequence[np.ndarray], running: StepHooks | None) -> bytes:
     """All that the paths of some windows follow from, as a hash: a model of the plant `own`, hooks, what is `given`."""
-    made = hashlib.sha1(usedforsecurity=False)
+    made = hashlib.sha1(repr([values.shape for values in given]).encode(), usedforsecurity=False)
     arrays = [*(values for model in variation.models for values in _content(own)(model)), *given]
     if running is not None and variation.hooks is not None:
         arrays += running.state_dict().values()
@@ -130,10 +132,12 @@ def _key(variation: Variation, own: Plant, given: Sequence[np.ndarray], running:
     return made.digest()
 
 
-@lru_cache(maxsize=64)
 def _content(own: Plant) -> Callable[[mujoco.MjModel], tuple[Any, ...]]:
     """Getter of all of a model but its assets (meshes, height fields), which are the plant's own."""
-    return attrgetter(*(name for name in sorted(MODEL_FIELDS) if np.size(attrgetter(name)(own.model))))
+    if own not in _contents:
+        names = (name for name in sorted(MODEL_FIELDS) if np.size(attrgetter(name)(own.model)))
+        _contents[own] = attrgetter(*names)
+    return _contents[own]
 
 
 def _words(hooks: RuntimeHooks) -> bytes:

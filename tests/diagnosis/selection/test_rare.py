@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.selection.proposals.packet_loss import LossLikelihoods
+from bumblebee.diagnosis.selection.proposals.loss_likelihoods import LossLikelihoods
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import simulate
 from tests.diagnosis.test_catalogue import CONFIG

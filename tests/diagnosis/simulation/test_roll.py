@@ -1,5 +1,7 @@
 """A path is simulated once, and what is known of one model is never told of another."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -65,3 +67,23 @@ def test_no_effect_is_taken_for_another(robot: str, monkeypatch: pytest.MonkeyPa
     rolling._known.clear()
     for c, v, told in zip(some, made, known, strict=True):
         assert np.array_equal(_left(problem, v), told, equal_nan=True), c
+
+
+def test_a_plant_that_nobody_uses_any_more_goes_with_its_paths() -> None:
+    problem, _ = robots()["arm"]
+    plant = replace(problem.plant)
+    _left(replace(problem, plant=plant), vary(plant, [single("coulomb_friction", arm.JOINTS[0], 0.1)]))
+    assert plant in rolling._known
+    gone = weakref.ref(plant)
+    del plant
+    gc.collect()
+    assert gone() is None
+
+
+def test_a_known_path_cannot_be_written_to() -> None:
+    problem, _ = robots()["arm"]
+    problem = replace(problem, plant=replace(problem.plant))
+    _left(problem, vary(problem.plant, [single("coulomb_friction", arm.JOINTS[0], 0.1)]))
+    (path,) = rolling._known[problem.plant].kept.values()
+    with pytest.raises(ValueError, match="read-only"):
+        path[0][:] = 0.0

@@ -10,75 +10,19 @@ really got, and the rest of the diagnosis goes on with that.
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from bumblebee.diagnosis.comparison import Holdout, criterion
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.changes import Asking, Loss, Lost
+from bumblebee.diagnosis.selection.proposals.loss_likelihoods import LossLikelihoods
 from bumblebee.diagnosis.selection.proposals.setpoints import explains_more
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.simulation import Windows, residuals, select, vary
-from bumblebee.diagnosis.thresholds.proposals import PacketLoss
 from bumblebee.sim.effects import Effect
-
-_HALF = 1.92  # half of a chi-square's 95 % quantile: fall of the log-likelihood at the ends of a 95 % interval
-
-
-@dataclass(frozen=True, eq=False)
-class LossLikelihoods:
-    """Likelihoods of W windows under the P patterns of their T ticks."""
-
-    patterns: np.ndarray
-    """(P, T) bool, the first without a loss."""
-    logs: np.ndarray
-    """(W, P) log-likelihood of each pattern, less that of none."""
-    rule: PacketLoss = field(default_factory=PacketLoss)
-    """How a share is sought."""
-    changes: np.ndarray | None = None
-    """(L, T, W, M) what single losses and runs of them do."""
-
-    def total(self, share: float) -> float:
-        """Log-likelihood of a share, summed over windows."""
-        return float(logsumexp(self.logs + self._prior(share), axis=1).sum())
-
-    @cached_property
-    def best(self) -> float:
-        """The share of largest likelihood, by expectation and maximisation."""
-        lost, share = self.patterns.sum(axis=1), self.rule.first_share
-        for _ in range(self.rule.iterations):
-            before, weights = share, self._weights(share)
-            share = float(np.clip((weights @ lost).mean() / self.patterns.shape[1], 1e-6, 0.9))
-            if share == before:
-                break
-        return share
-
-    def interval(self, share: float) -> tuple[float, float]:
-        """Shares between which the log-likelihood is within 1.92 of its maximum."""
-        grid = np.unique(np.concatenate((np.geomspace(1e-5, 0.9, 160), [share])))
-        inside = grid[np.array([self.total(p) for p in grid]) > self.total(share) - _HALF]
-        return float(inside[0]), float(inside[-1])
-
-    def likely(self, share: float) -> np.ndarray:
-        """(W, T) bool: the most likely pattern of each window."""
-        return self.patterns[np.argmax(self.logs + self._prior(share), axis=1)]
-
-    def price(self, share: float) -> float:
-        """Less the log-probability of each window's most likely pattern, summed: what it says beside the share."""
-        which = np.argmax(self.logs + self._prior(share), axis=1)
-        return -float(self._prior(share)[which].sum())
-
-    def _prior(self, share: float) -> np.ndarray:
-        lost = self.patterns.sum(axis=1)
-        return lost * np.log(share) + (self.patterns.shape[1] - lost) * np.log1p(-share)
-
-    def _weights(self, share: float) -> np.ndarray:
-        posterior = self.logs + self._prior(share)
-        return np.exp(posterior - logsumexp(posterior, axis=1, keepdims=True))
 
 
 def packet_loss_of(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Problem, Holdout] | None:
