@@ -108,7 +108,8 @@ def gpu() -> Said:
         yield True, False, f"GPU {torch.cuda.get_device_name()}"
     else:
         why = f"this torch {torch.__version__} sees none; training runs on the CPU"
-        yield False, False, f"NVIDIA GPU: {why}; with one: its driver, then in the checkout: make setup"
+        anew = ", then in the checkout: rm -r .venv && make setup" if torch.version.cuda is None else ""
+        yield False, False, f"NVIDIA GPU: {why}; with one: its driver{anew}"
 
 
 def disk() -> Said:

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Literal
 
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.policy import Shape
+from bumblebee.learning.policy import Policy, Shape
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.needs import needed
@@ -25,6 +25,10 @@ FROM_NOTHING = PpoConfig(
 """PPO from nothing, as the shipped policy was trained (its README)."""
 
 
+VALUE_FIRST = 20
+"""Iterations of PPO in which the value alone learns, where a policy comes without a critic."""
+
+
 def task(gpu: bool, threads: int) -> EnvConfig:
     """The task with the shipped policy's observation: on CPU threads, or on an NVIDIA GPU as it was trained."""
     if not gpu:
@@ -41,10 +45,10 @@ def as_seen_by(task: EnvConfig, shape: Shape) -> EnvConfig:
     return replace(task, observation=shape.seen, ahead=shape.ahead, action=shape.action, place=place)
 
 
-def algorithm(learner: str, gpu: bool, from_policy: bool) -> PpoConfig | WorldModelConfig:
-    """Settings of the learner of that name, by machine and start."""
+def algorithm(learner: str, gpu: bool, parent: Policy | None) -> PpoConfig | WorldModelConfig:
+    """Settings of the learner of that name, by machine and the policy that it starts from."""
     if learner == "world_model":
         return WorldModelConfig(compile=gpu, symmetry=True)
-    if from_policy:
-        return GENTLE
+    if parent is not None:
+        return GENTLE if parent.critic_state else replace(GENTLE, value_first=VALUE_FIRST)
     return FROM_NOTHING if gpu else replace(PpoConfig(), symmetry=True)

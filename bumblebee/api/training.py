@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from bumblebee.learning.policy import Policy
 
 _FIRST = 3  # iterations that measure the speed: the first of them loads kernels
+_CHECKPOINT = 60.0  # s of training
 
 
 @dataclass(frozen=True)
@@ -149,9 +150,10 @@ def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "L
     torch.set_num_threads(config.threads)
     own, parent = task(config.gpu, config.threads), parent_of(config.start)
     own = own if config.worlds is None else replace(own, num_worlds=config.worlds)
-    own = own if parent is None else as_seen_by(own, load_policy(parent).shape)
+    started = None if parent is None else load_policy(parent)
+    own = own if started is None else as_seen_by(own, started.shape)
     engine = make_engine(own.engine, task_model(own), own.num_worlds, own.threads, buffers=own.buffers)
-    settings = algorithm(config.learner or ("world_model" if config.gpu else "ppo"), config.gpu, parent is not None)
+    settings = algorithm(config.learner or ("world_model" if config.gpu else "ppo"), config.gpu, started)
     trained_on, _ = learners.played(settings, [clip for clip in clips if clip.split == "train"])
     env = TrackingEnv(MotionLibrary(trained_on, own.ahead, device=engine.device), engine, own, config.seed)
     return learners.make_learner(settings, env, folder, config.seed, parent)
@@ -167,9 +169,9 @@ def parent_of(start: str) -> Path | None:
 def train_for(learner: "Learner", seconds: float) -> None:
     """Train until `seconds` of training are done in all, those before a kill included; the curriculum follows the time.
 
-    The first iterations measure the speed, from which the length of the schedules follows.
+    The first iterations measure the speed, from which the length of the schedules follows. A checkpoint each minute.
     """
-    begin, marks = learner.iteration, []
+    begin, marks, saved = learner.iteration, [], learner._seconds
     learner.limit = seconds
 
     def aim(since: tuple[int, float]) -> None:
@@ -177,13 +179,21 @@ def train_for(learner: "Learner", seconds: float) -> None:
         left = max(round((seconds - learner._seconds) / each), 1)
         learner.config = replace(learner.config, iterations=learner.iteration + left)
 
+    def save_now_and_then() -> None:
+        nonlocal saved
+        if learner._seconds - saved >= _CHECKPOINT:
+            learner.save_checkpoint()
+            saved = learner._seconds
+
     def measured() -> bool:
+        save_now_and_then()
         marks.append((learner.iteration, learner._seconds))
         if len(marks) > 2:  # the first interval has the loading of kernels in it
             aim(marks[-2])
         return learner.iteration >= begin + _FIRST or learner._seconds >= seconds
 
     def enough() -> bool:
+        save_now_and_then()
         aim(since)
         return learner._seconds >= seconds
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
 import bumblebee as bb
 from bumblebee import cli
@@ -17,6 +18,7 @@ from bumblebee.api import training
 from bumblebee.api.policy_card import learnt_before, splits, tried
 from bumblebee.api.recipes import as_seen_by
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.motion.pieces import hold_out
 from bumblebee.tracking.config import EnvConfig
 from tests.deploy.conftest import nod
 
@@ -130,9 +132,13 @@ def test_an_evaluation_says_how_much_noise_there_was():
     assert next(tried(table, noise=0.5)).endswith("with 0.5 times the noise of training:")
 
 
-def test_ppo_from_a_policy_without_a_critic_is_one_line_that_names_the_other_learner():
-    with pytest.raises(bb.BadInput, match="world_model"):
-        bb.train(STAND, "policy", minutes=0.005, worlds=8, start="imu")
+def test_ppo_from_a_policy_without_a_critic_lets_the_value_learn_first(tmp_path):
+    learner = training.make_learner(hold_out(STAND, 0.0), training.TrainConfig(start="imu", worlds=8), tmp_path)
+    before = {name: value.clone() for name, value in learner.algorithm.actor.state_dict().items()}
+    learner.train("policy", lambda: learner.iteration >= 1)
+    weights = [name for name in before if name.endswith("weight")]
+    assert weights and learner.config.value_first > 1
+    assert all(torch.equal(before[name], learner.algorithm.actor.state_dict()[name]) for name in weights)
 
 
 def test_a_training_that_cannot_be_is_refused_before_motions_are_read(monkeypatch):
@@ -190,8 +196,8 @@ class Ends:
 class Hastens:
     """A learner whose iterations get faster: by the first ones, fewer would do."""
 
-    def __init__(self, folder: Path) -> None:
-        self.config, self.iteration, self._seconds, self.saved = Ends(), 0, 0.0, folder / "saved"
+    def __init__(self) -> None:
+        self.config, self.iteration, self._seconds, self.saved = Ends(), 0, 0.0, []
 
     def train(self, what, enough):
         last = self.config.iterations
@@ -200,12 +206,13 @@ class Hastens:
             self.iteration += 1
 
     def save_checkpoint(self):
-        self.saved.touch()
+        self.saved.append(self._seconds)
 
 
-def test_a_training_takes_the_time_that_it_was_given_however_fast_it_becomes(tmp_path):
-    learner = Hastens(tmp_path)
+def test_a_training_takes_the_time_that_it_was_given_however_fast_it_becomes(monkeypatch):
+    learner = Hastens()
+    monkeypatch.setattr(training, "_CHECKPOINT", 8.0)
     training.train_for(learner, 20.0)
-    assert learner._seconds == 20.0 and learner.saved.exists()
+    assert learner._seconds == 20.0 and learner.saved == [8.0, 16.0, 20.0]
     training.train_for(learner, 20.0)  # killed after its end, it has nothing left to do
     assert learner._seconds == 20.0

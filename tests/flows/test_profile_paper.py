@@ -1,16 +1,23 @@
 """profiles/paper.yaml has the figures of the paper's appendices A to D, typed off here; stages take its sections."""
 
+import json
+import subprocess
+import sys
 from functools import reduce
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from bumblebee.evaluation.contract import Thresholds
 from bumblebee.learning.delta.rewards import closeness
 from bumblebee.robot.facts import ANKLE_JOINTS, joint_names
 from bumblebee.tracking.rewards import PAPER_SHARPNESS, PAPER_WEIGHTS
-from flows.workspace import HOME, merge
+from flows.environment import environment
+from flows.stages import read_stages
+from flows.workspace import HOME, create, merge
 from tasks import params
 from tasks.sections import check_content
 
@@ -174,3 +181,42 @@ def test_the_head_says_what_is_open_what_differs_and_what_does_not_learn() -> No
         "limit of",
     ):
         assert named in head, named
+
+
+def tiny() -> dict[str, Any]:
+    """Budgets of profiles/smoke.yaml and less, on the processor; all else is the paper's."""
+    learner = {"num_worlds": 8, "physics_hz": 100, "threads": 1, "engine": "mujoco"}
+    ppo = {"iterations": 2, "steps": 8, "epochs": 1, "mini_batches": 1, "hidden": [32, 32]}
+    smoke = params.read(HOME / "profiles" / "smoke.yaml")
+    return merge(
+        smoke,
+        {
+            **{name: {"env": learner, "ppo": ppo} for name in ("base", "experts", "refine")},
+            "cluster": {"hidden": 32, "layers": 1, "heads": 2, "latent": 16, "max_steps": 20, "threads": 1},
+            "rollouts": {"motions": 4, "repeats": 1},
+            "diagnose": {"search_seconds": 1.0, "beyond_seconds": 1.0, "max_windows": 12},
+            "delta": {"engine": "mujoco", "num_envs": 8, "ppo": {**ppo, "iterations": 1}},
+            "distill": {"env": {**learner, "num_worlds": 8}, "iterations": 2, "capacity": 1000},
+        },
+    )
+
+
+@pytest.mark.slow
+def test_both_rounds_run_to_the_report(tmp_path: Path) -> None:
+    """Filter by a policy, elbow, PPO from nothing, delta actions by PPO, two rounds, the transformer; tiny budgets."""
+    folder = create(tmp_path / "paper", "paper")
+    settings = merge(params.read(folder / "params.yaml"), tiny())
+    (folder / "params.yaml").write_text(yaml.safe_dump(settings))
+    assert [row["n"] for row in settings["rounds"]] == [1, 2] and settings["delta"]["method"] == "ppo"
+    ran = subprocess.run(
+        [sys.executable, "-m", "dvc", "repro"],
+        cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=1800, check=False,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr[-3000:]
+    lock = yaml.safe_load((folder / "dvc.lock").read_text())["stages"]
+    assert set(lock) == {stage.name for stage in read_stages(folder)}
+    assert {"refine@after1-c0", "refine@after1-c1", "control@after1-c0-declared"} <= set(lock)
+    cards = [json.loads(file.read_text()) for file in sorted(folder.glob("models/delta/r*/c*/card.json"))]
+    assert len(cards) == 4 and {tuple(card["network"]["joints"]) for card in cards} == {ANKLE_JOINTS}
+    assert json.loads((folder / "data" / "published.json").read_text())["models"]["generalist"]
+    assert (folder / "reports" / "report.html").stat().st_size > 10_000

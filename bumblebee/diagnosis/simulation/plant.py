@@ -229,6 +229,7 @@ def _set_inputs(spec: mujoco.MjSpec, rollout: Rollout, where: object, rule: Driv
                     f"{where}: actuator {actuator.name!r}",
                     "a position servo, or kp and kd in the rollouts' metadata",
                     f"a motor and position targets in {rollout.rollout_id}",
+                    "Import with `meta: {kp: [...], kd: [...]}` in the map, a number a joint.",
                 )
             column = rollout.joints.index(name)
             take_target(actuator, float(kp[column]), float(kd[column]))
