@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import shutil
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ import yaml
 from benchmarks.baselines.methods import OURS
 from benchmarks.reward_arms import arms
 from bumblebee.errors import BadInput
-from bumblebee.io.write import new_folder
 from bumblebee.learning.config import PAPER, PpoConfig
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK
@@ -262,13 +260,6 @@ def frozen(out: Path) -> dict[str, Any]:
     if not path.exists():
         raise BadInput(path, "the settings of a run", "no such file", "Begin the run first.")
     return _read(path)
-
-
-def take_in(base: Path, folder: Path) -> None:
-    """Copy a base policy into a run, whole or not at all; nothing where it is there."""
-    if not folder.exists():
-        with new_folder(folder) as new:
-            shutil.copytree(base, new, dirs_exist_ok=True)
 
 
 def sha256(path: Path) -> str:
