@@ -14,6 +14,7 @@ from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
 from flows.ending import login_of, registry, serve, shown, summarise
 from flows.environment import environment
+from flows.gpus import require as require_gpus
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
@@ -113,10 +114,13 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0, verbose: bool
     os.environ.update(environment(folder))
     params.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
     sections.loop(folder / "params.yaml")
-    if not to_run(read_stages(folder), changed_stages(folder)):
+    busy = to_run(read_stages(folder), changed_stages(folder))
+    if not busy:
         print(f"everything in {shown(folder)} is up to date")
         summarise(folder)
         return 0
+    if not on_cluster(folder):
+        require_gpus(folder, busy)
     check = start_check(folder)
     check_cluster(folder)
     with servers(folder, prefect_port, mlflow_port) as addresses:

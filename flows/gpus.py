@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
 from flows.stages import kind_of
 from tasks import params
@@ -52,6 +53,30 @@ def usable(variables: Mapping[str, str] = os.environ) -> list[str]:
     except (OSError, subprocess.SubprocessError):
         return []
     return re.findall(r"^GPU .*\(UUID: (GPU-[^)]+)\)", said, re.MULTILINE)
+
+
+def require(workspace: Path, stages: Iterable[str]) -> None:
+    """Refuse stages that would want a GPU hours from now, on a machine without one.
+
+    Raises:
+        BadInput: for the first of them, by name.
+    """
+    file = workspace / "params.yaml"
+    content = params.read(file)
+    if not wanted(content, content) or usable():
+        return
+    described = read_yaml(workspace / "dvc.yaml")["stages"]
+    lacking = [name for name in sorted(stages) if wanted(content, described.get(kind_of(name), {}).get("params", []))]
+    if lacking and not _seen_by_torch():
+        do = "Run it where there is one, or change `engine` to `mujoco` for the processor."
+        raise BadInput(f"{file}: engine mujoco_warp", f"an NVIDIA GPU for the stage {lacking[0]}", "none here", do)
+
+
+def _seen_by_torch() -> bool:
+    """Whether torch finds a GPU, as in a container without the driver's program."""
+    import torch
+
+    return torch.cuda.is_available()
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bumblebee.errors import BadInput
 from flows import gpus, loop
 
 LISTING = """GPU 0: NVIDIA H100 80GB HBM3 (UUID: GPU-aaaa)
@@ -42,6 +43,17 @@ def test_stages_side_by_side_are_spread_over_all_devices_before_any_is_shared(wo
         assert seen(running, workspace, "experts@c0") == "4", "those that ended leave their devices"
         assert seen(running, workspace, "refine@after0-c0") == "5,6", "one that trains on two gets two"
         assert seen(running, workspace, "experts@c1") == "7"
+
+
+def test_a_machine_without_a_gpu_is_refused_before_the_first_stage(workspace: Path, monkeypatch: pytest.MonkeyPatch):
+    gpus.require(workspace, ["experts@c0"])
+    monkeypatch.setenv(gpus.VARIABLE, "")
+    monkeypatch.setattr(gpus, "_seen_by_torch", lambda: False)
+    gpus.require(workspace, ["delta@after0-c0", "data/raw/mine.dvc"])
+    with pytest.raises(BadInput, match=r"params.yaml: engine mujoco_warp: .* for the stage experts@c0, came none here"):
+        gpus.require(workspace, ["refine@after0-c0", "experts@c0", "delta@after0-c0"])
+    monkeypatch.setattr(gpus, "_seen_by_torch", lambda: True)
+    gpus.require(workspace, ["experts@c0"])
 
 
 def test_a_device_that_becomes_free_is_the_next_ones(workspace: Path):
