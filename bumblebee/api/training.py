@@ -61,6 +61,13 @@ class Trained:
     """Trials of the kept policy, a row a motion, as `evaluate` returns them."""
     dropped: "pd.DataFrame"
     """Motions that the filter dropped: `motion`, `rule`, `explanation` ..."""
+    no_better: bool
+    """Whether training did not improve success on the training motions, so that `policy` is the one it began from."""
+
+    def __repr__(self) -> str:
+        """One line: where, how many motions it follows, and which policy was kept."""
+        followed = f"{int(self.trials['success'].sum())} of {len(self.trials)} motions followed"
+        return f"<policy in {self.folder}: {followed}{'; the initial policy was kept' if self.no_better else ''}>"
 
 
 def train(
@@ -265,7 +272,7 @@ def _kept(
         contract = json.loads((folder / CONTRACT).read_text())
         (folder / "README.md").write_text(readme(card, contract, kept))
         write_pictures(folder / "film.gif", follow(policy, shown))
-    return Trained(out, policy, kept, dropped)
+    return Trained(out, policy, kept, dropped, kept is before)
 
 
 def _score(trials: "pd.DataFrame") -> tuple[float, float]:

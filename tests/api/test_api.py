@@ -51,6 +51,9 @@ def test_the_examples_of_the_page_run():
     for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S):
         exec(block, scope)
     assert {path.name for path in Path("policy").iterdir()} == FILES
+    assert re.fullmatch(
+        r"<policy in policy: \d of 2 motions followed(; the initial policy was kept)?>", repr(scope["made"])
+    )
     card = json.loads(Path("policy/card.json").read_text())
     assert (card["parent"], card["learner"]) == ("shipped", "ppo")
     assert "- learner: ppo\n" in Path("policy/README.md").read_text()
