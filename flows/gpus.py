@@ -7,6 +7,7 @@ that starts the loop, or else all of the machine: `CUDA_VISIBLE_DEVICES=0,2 make
 import os
 import re
 import subprocess
+import sys
 import threading
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -73,10 +74,9 @@ def require(workspace: Path, stages: Iterable[str]) -> None:
 
 
 def _seen_by_torch() -> bool:
-    """Whether torch finds a GPU, as in a container without the driver's program."""
-    import torch
-
-    return torch.cuda.is_available()
+    """Whether torch, in a process of its own, finds a GPU, as in a container without the driver's program."""
+    command = [sys.executable, "-c", "import torch; raise SystemExit(not torch.cuda.is_available())"]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
 @contextmanager

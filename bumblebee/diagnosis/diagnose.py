@@ -25,6 +25,7 @@ from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
 from bumblebee.diagnosis.report import (
     Findings,
+    before_and_after,
     document,
     effect_entries,
     harms,
@@ -115,7 +116,8 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     entries = [*entries, *(rounded if steps else []), *lost]
     told = _told(material, config, found, Findings(effects, entries, notes))
     if effects and material.session.holdout and harms(told["summary"]["removed"]):
-        found, notes = _nothing(material, found), [*notes, withdrawn(effects, "held-out rollouts")]
+        errors = before_and_after(told["summary"]["removed"])
+        found, notes = _nothing(material, found), [*notes, f"{withdrawn(effects, 'held-out rollouts')}; {errors}"]
         effects = []
         told = _told(material, config, found, Findings([], [], notes))
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)

@@ -3,7 +3,7 @@
 from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import at_bounds, effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
-from bumblebee.diagnosis.report.gain_by_horizon import harms
+from bumblebee.diagnosis.report.gain_by_horizon import before_and_after, harms
 from bumblebee.diagnosis.report.html import (
     NO_INLAY,
     Inlay,
@@ -39,6 +39,7 @@ __all__ = [
     "HorizonWindows",
     "Inlay",
     "at_bounds",
+    "before_and_after",
     "cloud_picture",
     "document",
     "effect_entries",

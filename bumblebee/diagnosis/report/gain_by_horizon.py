@@ -50,6 +50,15 @@ def harms(removed: Mapping[str, Sequence[Mapping[str, Any]]]) -> bool:
     return any(high < 0 for _, high in intervals) and not any(low > 0 for low, _ in intervals)
 
 
+def before_and_after(removed: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """The errors of each horizon before and after, in one line."""
+    return ", ".join(
+        f"{entry['what']} after {horizon} s {entry['before']:.3g} to {entry['after']:.3g} {entry['unit']}"
+        for horizon, entries in removed.items()
+        for entry in entries
+    )
+
+
 def gain_by_horizon(removed: Mapping[str, Sequence[Mapping[str, Any]]], rules: ReportThresholds) -> GainByHorizon:
     """From the entries of each horizon in `summary.removed`."""
     verdicts = {name: {e["what"]: _verdict(e, rules) for e in entries} for name, entries in removed.items()}
