@@ -13,6 +13,11 @@ def test_the_block_of_readme_is_what_the_file_gives():
     assert figures.with_block(page, figures.block(json.loads(figures.FILE.read_text()))) == page, "make figures"
 
 
+def test_each_difference_that_readme_shows_is_in_the_file():
+    differences = json.loads(figures.FILE.read_text())["differences"]
+    assert all(sum(line.startswith(shown) for line in differences) == 1 for shown in figures.SHOWN)
+
+
 def test_the_block_alone_is_replaced():
     page = f"before\n{figures.BEGIN}old 1\n{figures.END}after\n"
     assert figures.with_block(page, "new 2\n") == f"before\n{figures.BEGIN}new 2\n{figures.END}after\n"

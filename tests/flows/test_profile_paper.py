@@ -196,7 +196,7 @@ def tiny() -> dict[str, Any]:
             "rollouts": {"motions": 4, "repeats": 1},
             "diagnose": {"search_seconds": 1.0, "beyond_seconds": 1.0, "max_windows": 12},
             "delta": {"engine": "mujoco", "num_envs": 8, "ppo": {**ppo, "iterations": 1}},
-            "distill": {"env": {**learner, "num_worlds": 8}, "iterations": 2, "capacity": 1000},
+            "distill": {"env": learner, "iterations": 2, "capacity": 1000},
         },
     )
 
