@@ -176,7 +176,8 @@ def parent_of(start: str) -> Path | None:
 def train_for(learner: "Learner", seconds: float) -> None:
     """Train until `seconds` of training are done in all, those before a kill included; the curriculum follows the time.
 
-    The first iterations measure the speed, from which the length of the schedules follows. A checkpoint each minute at the latest.
+    The first iterations measure the speed, from which the length of the schedules follows.
+    A checkpoint comes each minute at the latest.
     """
     begin, marks, saved = learner.iteration, [], learner._seconds
     learner.limit = seconds
