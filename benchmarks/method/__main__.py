@@ -73,13 +73,18 @@ def sealed_robots(folder: Path | None) -> dict[str, str]:
 
 def write_table(options: argparse.Namespace) -> None:
     """Write the tables of a run, as far as it is done."""
-    from benchmarks.method.tables import method_tables
+    from benchmarks.method.tables import figures, method_tables
 
     method, motions = NAMED[options.settings], read_motions(options.motions)
     stamp = freeze(options.run, method, settings=options.settings, motions=motions.hash)
     text = method_tables(options.run, method, motions, options.robots)
     options.out.write_text(f"<!-- method {stamp}, motions {motions.hash} -->\n\n{text}")
     print(text, end="")
+    if options.record:
+        from benchmarks.method.record import record
+
+        run_id = record(options.run, options.out, method, stamp, figures(options.run, method, motions))
+        print(f"run {run_id} in the registry of {Path.cwd()}", flush=True)
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -101,6 +106,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     table = commands.add_parser("table", help="the tables of a run")
     table.add_argument("run", type=Path)
     table.add_argument("--out", type=Path, required=True, help="Markdown file")
+    table.add_argument("--record", action="store_true", help="write them into the registry too, with all hashes")
     table.set_defaults(work=write_table)
     for part in (own, table):
         part.add_argument("--motions", type=Path, required=True, help="folder of `benchmarks.study prepare`")

@@ -18,6 +18,7 @@ from benchmarks.method.places import (
     student,
 )
 from benchmarks.method.settings import Method
+from benchmarks.method.students import AHEAD, CHANGED, changed, is_student, student_of
 from benchmarks.study.steps import Step
 
 WORK = "benchmarks.method.work"
@@ -51,11 +52,15 @@ class Plan:
             self._tried(who)
         for line in DECLARED_LINES:
             self._tried(student(line))
+            self._tried(changed(line, AHEAD))
+        for own in (student(OWN), *(changed(OWN, name) for name in CHANGED)):
+            self._tried(own, [])
         for robot in robots:
             for name in ARMS:
                 for round_ in range(1, method.rounds + 1):
-                    self._tried(Place(robot, name, round_).name, robot)
-                self._tried(student(arm(robot, name)), robot)
+                    self._tried(Place(robot, name, round_).name, [robot])
+                self._tried(student(arm(robot, name)), [robot])
+                self._tried(changed(arm(robot, name), AHEAD), [robot])
 
     def _robot(self, robot: str) -> None:
         """All rounds of all arms on a robot."""
@@ -78,7 +83,8 @@ class Plan:
         deltas = [f"delta {robot}/{name}/r1/{cluster}" for name in ("delta", "both") for cluster in self.clusters]
         self._add("errors", first.recorded, [together, *deltas, f"diagnosis {first.recorded}"])
         for name in ARMS:
-            self._distil(arm(robot, name))
+            self._distil(student(arm(robot, name)))
+            self._distil(changed(arm(robot, name), AHEAD))
 
     def _controls(self) -> None:
         """Trainings without a round, by how much they are wanted."""
@@ -88,7 +94,10 @@ class Plan:
         for policy in self._of(RANDOM):
             self._add("train", policy, [f"train {BASE}"], gpu=True)
         for line in DECLARED_LINES:
-            self._distil(line)
+            self._distil(student(line))
+            self._distil(changed(line, AHEAD))
+        for own in (student(OWN), *(changed(OWN, name) for name in CHANGED)):
+            self._distil(own)
 
     def _record(self, place: Place, needs: Sequence[str]) -> None:
         for shard in range(self.method.shards):
@@ -97,16 +106,16 @@ class Plan:
     def _recorded(self, place: str) -> list[str]:
         return [f"record {place} {shard}" for shard in range(self.method.shards)]
 
-    def _distil(self, line: str) -> None:
-        teachers = sorted({f"train {policy}" for policy in self._of(line)})
-        self._add("distil", student(line), teachers, gpu=True)
+    def _distil(self, who: str) -> None:
+        teachers = sorted({f"train {policy}" for policy in self._of(student_of(who)[0])})
+        self._add("distil", who, teachers, gpu=True)
 
-    def _tried(self, who: str, robot: str | None = None) -> None:
-        """On declared and drawn robots, and on its own robot or all."""
-        needs = [f"distil {who}"] if who.endswith("/student") else sorted({f"train {one}" for one in self._of(who)})
+    def _tried(self, who: str, robots: Sequence[str] | None = None) -> None:
+        """On declared and drawn robots, and on sealed ones: those named, or all."""
+        needs = [f"distil {who}"] if is_student(who) else sorted({f"train {one}" for one in self._of(who)})
         for shard in range(self.method.shards):
             self._add("tried", who, needs, shard=shard)
-        for own in self.robots if robot is None else [robot]:
+        for own in self.robots if robots is None else robots:
             for shard in range(self.method.shards):
                 self._add("sealed", who, needs, shard=shard, robot=own)
 

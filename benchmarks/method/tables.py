@@ -1,7 +1,8 @@
 """Tables of a run, of what has been tried so far: rows beside each other, rounds by cluster, corrections, diagnoses."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pandas as pd
 
 from benchmarks.method.places import ARMS, BASE, GENERAL, LONGER, ONE, OWN, RANDOM, TOGETHER, Place, arm, student
 from benchmarks.method.settings import Method
+from benchmarks.method.students import AHEAD, CHANGED, USUAL, changed
 from benchmarks.study.motions import Motions
 from benchmarks.study.tables import (
     RATES,
@@ -39,19 +41,27 @@ ROWS = {
 }
 WHOLE = "delta"
 """The row that is the paper's method."""
+_CHANGE = ("", ", less the usual", ", less the experts")
 SEALED = "sealed"
+KINDS: dict[str, Callable[[str], str] | None] = {
+    "Transformers": student,
+    "Transformers that see the reference ahead": partial(changed, name=AHEAD),
+    "Experts": None,
+}
+"""Sections, and what is distilled from a line in each; None: its experts themselves."""
 
 
 def method_tables(out: Path, method: Method, motions: Motions, robots: Path | None) -> str:
     """All tables as Markdown."""
-    names = sorted(path.name for path in out.iterdir() if (path / "own").is_dir() and path.name != "declared")
-    parts = []
-    for what, distilled in (("Transformers", True), ("Experts", False)):
-        rows = _rows(out, method, motions, names, distilled)
+    names, parts = sealed_on(out), []
+    for what, folder in KINDS.items():
+        rows = _rows(out, method, motions, names, folder)
         for robot in ("declared", "drawn", SEALED):
             own = rows[rows["on"] == robot]
             if not own.empty:
                 parts.append(f"### {what}, {robot} robots\n\n{methods_table(own, ROWS, 'row')}\n{_pairs(own)}")
+        if folder is student:
+            parts.append(f"### Transformers with one thing changed, declared robot\n\n{_changes(out, method, motions)}")
     if names:
         parts.append(
             f"### Experts by cluster after each round, sealed robots\n\n{_rounds(out, method, motions, names)}"
@@ -61,6 +71,23 @@ def method_tables(out: Path, method: Method, motions: Motions, robots: Path | No
     if names and robots is not None:
         parts.append(f"### What diagnoses found, and what was sealed\n\n{_found(out, names, robots)}")
     return "\n".join(parts)
+
+
+def figures(out: Path, method: Method, motions: Motions) -> dict[str, float]:
+    """Success in the own place of every row that was tried: section, robots, motions, row -> value, low and high."""
+    found, robots = {}, sealed_on(out)
+    for what, folder in KINDS.items():
+        rows = _rows(out, method, motions, robots, folder)
+        for (on, split, key), own in rows.groupby(["on", "split", "arm"]):
+            value = rate(own, "success_local")
+            told = f"{what}/{on}/{SPLITS[split]}/{_plain(key)}"
+            found |= {told: value.value, f"{told} low": value.low, f"{told} high": value.high}
+    return found
+
+
+def sealed_on(out: Path) -> list[str]:
+    """Names of the robots of a run."""
+    return sorted(path.name for path in out.iterdir() if (path / "own").is_dir() and path.name != "declared")
 
 
 def read(out: Path, who: str, kind: str, method: Method, motions: Motions) -> pd.DataFrame | None:
@@ -80,10 +107,12 @@ def read(out: Path, who: str, kind: str, method: Method, motions: Motions) -> pd
     return table.merge(motions.labels[["name", "motion", "cluster"]], on="name", validate="many_to_one")
 
 
-def _rows(out: Path, method: Method, motions: Motions, robots: Sequence[str], distilled: bool) -> pd.DataFrame:
+def _rows(
+    out: Path, method: Method, motions: Motions, robots: Sequence[str], folder: Callable[[str], str] | None
+) -> pd.DataFrame:
     """Trials of all rows; `on` is declared, drawn or sealed, and `seed` the number of the robot that a row is for."""
     tables = []
-    for key, who, own, index in _who(robots, method, distilled):
+    for key, who, own, index in _who(robots, method, folder):
         if (table := read(out, who, "tried", method, motions)) is not None:
             tables.append(table.assign(arm=key, seed=index, on=table["robot"]))
         for robot in robots if own is None else [own]:
@@ -92,17 +121,44 @@ def _rows(out: Path, method: Method, motions: Motions, robots: Sequence[str], di
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["on"])
 
 
-def _who(robots: Sequence[str], method: Method, distilled: bool) -> Iterator[tuple[str, str, str | None, int]]:
+def _who(
+    robots: Sequence[str], method: Method, folder: Callable[[str], str] | None
+) -> Iterator[tuple[str, str, str | None, int]]:
     """Row, folder below the run's, the robot that it is for, and that one's number."""
     for key in (BASE, OWN, GENERAL, ONE, RANDOM, LONGER):
-        if distilled and key not in (BASE, OWN):
-            yield key, student(key), None, 0
-        elif not distilled and key != GENERAL:
+        if folder is not None and key != BASE:
+            yield key, folder(key), None, 0
+        elif folder is None and key != GENERAL:
             yield key, key, None, 0
     for index, robot in enumerate(robots):
         for name in ARMS:
             line_ = arm(robot, name)
-            yield name, student(line_) if distilled else Place(robot, name, method.rounds).name, robot, index
+            yield name, folder(line_) if folder else Place(robot, name, method.rounds).name, robot, index
+
+
+def _changes(out: Path, method: Method, motions: Motions) -> str:
+    """The students of the experts before any round: KL at the end, success in the own place, what the change brings."""
+    folders = {student(OWN): USUAL} | {changed(OWN, name): each for name, each in CHANGED.items()}
+    tables = {OWN: read(out, OWN, "tried", method, motions)}
+    tables |= {who: read(out, who, "tried", method, motions) for who in folders}
+    tried = [table.assign(arm=who, seed=0) for who, table in tables.items() if table is not None]
+    lines = head(["student", "KL", *(f"{which}{told}" for which in SPLITS.values() for told in _CHANGE)])
+    if not tried:
+        return ""
+    rows = pd.concat(tried, ignore_index=True)
+    rows = rows[rows["robot"] == "declared"]
+    for who, each in folders.items():
+        if tables[who] is None:
+            continue
+        cells = [each.told, f"{json.loads((out / who / 'done.json').read_text())['kl']:.1f}"]
+        for split in SPLITS:
+            own = rows[rows["split"] == split]
+            cells.append(cell(rate(own[own["arm"] == who], "success_local"), 2))
+            for other in (student(OWN), OWN):
+                there = who != other and (own["arm"] == other).any()
+                cells.append(signed(difference(own, who, other, "success_local")[0]) if there else "")
+        lines.append(line(cells))
+    return "\n".join(lines) + "\n"
 
 
 def _pairs(rows: pd.DataFrame) -> str:

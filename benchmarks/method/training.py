@@ -9,12 +9,13 @@ import torch
 
 from benchmarks.method.places import ARMS, BASE, LONGER, ONE, OWN, RANDOM, Place, experts
 from benchmarks.method.settings import Method, iterations
+from benchmarks.method.students import student_of
 from benchmarks.study.correction import DECLARED, Correction
 from benchmarks.study.motions import Motions
 from bumblebee.io.write import write_file
 from bumblebee.learning.delta import of_clusters
 from bumblebee.learning.distill import CHECKPOINT as DISTILLING
-from bumblebee.learning.distill import DistillConfig, Distiller
+from bumblebee.learning.distill import Distiller
 from bumblebee.learning.learner import CHECKPOINT, Learner
 from bumblebee.learning.learners import Config, make_learner, played
 from bumblebee.learning.policy import load_policy
@@ -27,7 +28,6 @@ from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.presets import STUDENT
 from bumblebee.tracking.sampler import ClipShares
 
 CHECKPOINT_EVERY = 60
@@ -71,15 +71,15 @@ class Training:
         (folder / CHECKPOINT).unlink(missing_ok=True)
         return True
 
-    def distil(self, line: str) -> bool:
-        """Distil the line's experts into its student, in the simulator that they were trained in."""
+    def distil(self, name: str) -> bool:
+        """Distil a line's experts into the student of this folder, in the simulator that they were trained in."""
         torch.set_num_threads(self.method.env.threads)
-        own, folder = self.method.distil, self.out / f"{line}/student"
+        folder, (line, student) = self.out / name, student_of(name)
         folder.mkdir(parents=True, exist_ok=True)
         names = experts(line, self.motions.clusters, self.method.rounds)
         clusters = self.motions.cluster_indices(self.clips, self.method.seed if line == RANDOM else None)
         teachers = {index: load_policy(self.out / name) for index, name in enumerate(names)}
-        config = self._distilling()
+        config = student.config(self.method, self._task(ONE))
         corrections = [correction(self.out, name) for name in names]
         shared = Correction(corrections[0].diagnosis)
         env = environment(self.clips, config.env, config.seed, shared, ClipShares.equal(clusters))
@@ -87,14 +87,17 @@ class Training:
         env.action_adapter = of_clusters(env, clusters, {i: one for i, one in adapters.items() if one is not None})
         distiller = Distiller(env, teachers, clusters, config, load_policy(self.out / BASE), folder)
         distiller.train(enough=self.over)
-        if distiller.iteration < own.iterations:
+        if distiller.iteration < config.iterations:
             distiller.save_checkpoint(folder)
             return False
         curve = distiller.curve()
         curve.to_csv(folder / CURVE, index=False)
         distiller.policy().save(folder)
         kl = float(curve["kl"].tail(max(len(curve) // 10, 1)).mean())
-        write_file(folder / DONE, json.dumps({"frames": own.frames, "kl": round(kl, 4)}) + "\n")
+        write_file(
+            folder / DONE,
+            json.dumps({"frames": distiller.iteration * distiller.frames_each, "kl": round(kl, 4)}) + "\n",
+        )
         (folder / DISTILLING).unlink(missing_ok=True)
         return True
 
@@ -134,19 +137,6 @@ class Training:
             return make_learner(config, env, folder, self.method.seed, parent)
         origin = Parent.load(self.out / BASE)
         return ContinuedTrainer(env, config, folder, origin, None, self.method.seed, parent)
-
-    def _distilling(self) -> DistillConfig:
-        own = self.method.distil
-        return DistillConfig(
-            iterations=own.iterations,
-            steps=own.steps,
-            learning_rate=own.rate,
-            capacity=own.capacity,
-            init="scratch",
-            model="transformer",
-            seed=self.method.seed,
-            env=replace(self._task(ONE), num_worlds=own.worlds, student=STUDENT),
-        )
 
 
 def correction(out: Path, policy: str) -> Correction:

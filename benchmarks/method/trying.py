@@ -11,6 +11,7 @@ from torch import Tensor
 
 from benchmarks.method.places import RANDOM, experts
 from benchmarks.method.settings import Method
+from benchmarks.method.students import is_student
 from benchmarks.study.motions import Motions
 from benchmarks.study.on_robot import write_csv
 from benchmarks.study.robots import RobotsConfig
@@ -65,7 +66,7 @@ class Trying:
 
     def _each(self, who: str, shard: int, clips: list[Clip], follow_all: Follow) -> pd.DataFrame:
         """Rows of the shard's clips, the same batches of clips whoever follows them."""
-        if who.endswith("/student"):
+        if is_student(who):
             names, owners = [who], [0] * len(clips)
         else:
             names = experts(who, self.motions.clusters, self.method.rounds)

@@ -24,7 +24,7 @@ def do(options: argparse.Namespace) -> bool:
         training = Training(method, motions, options.out, deadline(options.seconds))
         if options.kind == "train":
             return training.train(where)
-        return training.distil(where.removesuffix("/student"))
+        return training.distil(where)
     if options.kind == "tried":
         Trying(method, motions, options.out, options.robots).tried(where, options.shard)
     elif options.kind == "sealed":

@@ -23,6 +23,8 @@ from benchmarks.study.motions import read_motions
 from bumblebee.errors import BadInput
 from bumblebee.learning import pretrained
 from bumblebee.learning.policy import load_policy
+from tasks.lineage import path_hash
+from tasks.registry import experiment_name, prepare
 from tests.benchmarks import study_folder
 
 CLUSTERS = ["c0", "c1"]
@@ -131,6 +133,23 @@ def test_no_sealed_robot_is_one_line(folder: Path, tmp_path: Path) -> None:
     assert list(command.sealed_robots(folder / "robots")) == ["robot-0"]
 
 
+def recorded_with_hashes(folder: Path, out: Path, robots: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table goes into the registry with the hash of each policy, and only from below the working folder."""
+    monkeypatch.chdir(folder)
+    given = [str(out), "--motions", str(folder), "--robots", str(robots), "--settings", "small", "--record"]
+    with pytest.raises(BadInput, match="--out: expected a file below"):
+        command.write_table(command.parse(["table", *given, "--out", str(folder.parent / "elsewhere.md")]))
+    command.write_table(command.parse(["table", *given, "--out", "method.md"]))
+    client = prepare()
+    experiment = client.get_experiment_by_name(experiment_name())
+    assert experiment is not None
+    (run,) = client.search_runs([experiment.experiment_id], "tags.stage = 'method'")
+    listed = json.loads(Path(client.download_artifacts(run.info.run_id, "method.json", str(folder))).read_text())
+    assert listed["robot-0/delta/r1/c0/policy.pt"] == path_hash(out / "robot-0/delta/r1/c0/policy.pt")
+    assert listed["robot-0/own/r1/record-0"].endswith(".dir")
+    assert 0 <= run.data.metrics["Transformers/sealed/held out/BumbleBee"] <= 1
+
+
 @pytest.mark.slow
 def test_every_step_runs_and_is_made_into_tables(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     method = replace(SMALL, rounds=1)
@@ -155,6 +174,8 @@ def test_every_step_runs_and_is_made_into_tables(folder: Path, monkeypatch: pyte
     ):
         assert told in text
     assert text.count("| held out | 2 |") >= 3 * (7 + 7)
+    assert "| sees what the experts see; an MLP" in text
+    recorded_with_hashes(folder, out, robots, monkeypatch)
     errors = pd.read_csv(out / "robot-0" / "own" / "r1" / "errors.csv")
     assert set(errors["correction"]) == {"declared", "general delta", "delta", "physics", "both"}
     assert json.loads((out / student("robot-0/delta") / "done.json").read_text())["frames"] > 0
