@@ -1,6 +1,6 @@
 """The diagnosis from end to end: what the model lacks, how much of it, how sure, and what is left."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import monotonic
@@ -10,7 +10,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.comparison import Holdout, standing, withdrawn
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.comparison import Holdout, simulated_without, standing, withdrawn
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.discrepancy import (
@@ -28,6 +29,7 @@ from bumblebee.diagnosis.report import (
     before_and_after,
     document,
     effect_entries,
+    errors_of,
     harms,
     law_notes,
     loss_entries,
@@ -112,15 +114,56 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     effects, steps, notes = standing(found.judging, found.last.fit.effects, steps)
     if found.last.fit.chosen and not effects:
         found, entries = _nothing(material, found), []
-    effects = [*effects, *steps, *losses]
-    entries = [*entries, *(rounded if steps else []), *lost]
-    told = _told(material, config, found, Findings(effects, entries, notes))
+    beside = Findings([*steps, *losses], [*(rounded if steps else []), *lost], notes)
+    effects = [*effects, *beside.effects]
+    told = _told(material, config, found, Findings(effects, [*entries, *beside.entries], notes))
     if effects and material.session.holdout and harms(told["summary"]["removed"]):
-        errors = before_and_after(told["summary"]["removed"])
-        found, notes = _nothing(material, found), [*notes, f"{withdrawn(effects, 'held-out rollouts')}; {errors}"]
-        effects = []
-        told = _told(material, config, found, Findings([], [], notes))
+        found, told, effects = _harmless(material, config, found, effects, beside, told)
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)
+
+
+def _harmless(
+    material: Material,
+    config: DiagnosisConfig,
+    found: _Found,
+    effects: Sequence[Effect],
+    beside: Findings,
+    told: dict[str, Any],
+) -> tuple[_Found, dict[str, Any], list[Effect]]:
+    """Withdraw one effect after the other until the rest does no harm on held-out rollouts; all where that never is.
+
+    Validation windows, which are not those that judge, say which goes first: that without which they err least.
+
+    Args:
+        material: the data.
+        config: settings.
+        found: what was found.
+        effects: all of it, as values.
+        beside: what was not fitted but read off the logs, and the notes.
+        told: the document with all effects, which do harm.
+
+    Returns:
+        What is left of it, its document, its effects.
+    """
+    errors, session, fit = before_and_after(told["summary"]["removed"]), material.session, found.last.fit
+
+    def stands(rest: _Found, left: list[Effect], entries: list[dict[str, Any]]) -> dict[str, Any]:
+        gone = withdrawn([effect for effect in effects if effect not in left], "held-out rollouts")
+        return _told(material, config, rest, Findings(left, entries, [*beside.notes, f"{gone}; {errors}"]))
+
+    if session.accept:
+        shares = partial(shares_left_out, session, config.report_windows)
+        less = [fit.without([candidate]).effects for candidate in fit.chosen]
+        order = np.argsort(errors_of(session, session.accept, config.report_windows, less), kind="stable")
+        for count in range(1, len(order)):
+            rest = _without(material, found, [fit.chosen[i] for i in order[:count]])
+            left = [*rest.last.fit.effects, *beside.effects]
+            entries = effect_entries(rest.search, rest.last, rest.holdout, rest.beyond, shares)
+            told = stands(rest, left, [*entries, *beside.entries])
+            if not harms(told["summary"]["removed"]):
+                return rest, told, left
+    nothing = _nothing(material, found)
+    return nothing, stands(nothing, [], []), []
 
 
 def _told(material: Material, config: DiagnosisConfig, found: _Found, findings: Findings) -> dict[str, Any]:
@@ -193,6 +236,21 @@ def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, 
     rule = found.judging.thresholds.selection.proposals.encoder_resolution
     readings = grids(session.rollouts, session.sigma[: len(session.plant.joints)], rule)
     return rounding_entries(readings, found.judging, found.last.fit)
+
+
+def _without(material: Material, found: _Found, gone: Sequence[Candidate]) -> _Found:
+    """The other effects where they are, in the place of all."""
+    problem = found.last.problem
+    fit = simulated_without(problem, found.last.fit, gone)
+    weights = window_weights(fit.clean(problem))
+    laws = {candidate: law for candidate, law in found.last.other_laws.items() if candidate not in gone}
+    last = Refined(problem, fit, weights, half_widths(problem, fit, weights), laws)
+    holdout, beyond = found.holdout.relinearised(fit.effects), found.beyond
+    if beyond is not None:
+        activity = JointActivity(material.typical, material.still)
+        left = lack_of_fit(problem, holdout.problem, fit, activity)
+        beyond = replace(beyond, problem=problem, holdout=holdout, fit=fit, left=left)
+    return replace(found, last=last, holdout=holdout, beyond=beyond)
 
 
 def _nothing(material: Material, found: _Found) -> _Found:

@@ -3,7 +3,7 @@
 import argparse
 import json
 import shutil
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pandas as pd
@@ -16,6 +16,7 @@ from benchmarks.method.on_robot import OnRobot, recorded_motions
 from benchmarks.method.places import ARMS, BASE, GENERAL, LONGER, ONE, OWN, RANDOM, Place, experts, student
 from benchmarks.method.plan import Plan
 from benchmarks.method.settings import NAMED, SMALL, Method
+from benchmarks.method.students import AHEAD, CHANGED, USUAL, changed, is_student, student_of
 from benchmarks.method.tables import _alike, method_tables
 from benchmarks.method.training import Training, correction
 from benchmarks.method.trying import Experts
@@ -125,6 +126,14 @@ def test_a_row_for_one_robot_stands_beside_that_robots_rows_and_a_control_beside
         LONGER: {0, 1},
     }
     assert _alike(rows, "both", LONGER).empty
+
+
+def test_a_changed_student_differs_in_one_thing_and_its_folder_says_in_which() -> None:
+    for name, each in CHANGED.items():
+        assert student_of(changed("robot-0/both", name)) == ("robot-0/both", each)
+        assert sum(getattr(each, field.name) != getattr(USUAL, field.name) for field in fields(USUAL)) == 2  # and title
+    assert student_of(student(OWN)) == (OWN, USUAL)
+    assert is_student(changed(ONE, AHEAD)) and not is_student(f"{OWN}/c0")
 
 
 def test_no_sealed_robot_is_one_line(folder: Path, tmp_path: Path) -> None:

@@ -3,8 +3,8 @@
 Each effect had to pay there when it was accepted, but not all of what stands in the end is judged so: steps of encoders
 are read off the logs, a last fit moves every value. A correction that makes things worse is withdrawn, with a note.
 Here windows of 0.2 s are judged in units of their noise, in logarithms, so that a few that went far astray count
-little; the error in radians after 1 s, which is reported, can be larger all the same. So what is surely worse there at
-some horizon and surely better at none is withdrawn too (`report.gain_by_horizon.harms`).
+little; the error in radians after 1 s, which is reported, can be larger all the same. So of what is surely worse there
+at some horizon and surely better at none (`report.gain_by_horizon.harms`), one after the other goes (`diagnose`).
 """
 
 from collections.abc import Sequence

@@ -18,7 +18,7 @@ from bumblebee.diagnosis.report.html import (
     table,
     warning,
 )
-from bumblebee.diagnosis.report.left_out import shares_left_out
+from bumblebee.diagnosis.report.left_out import errors_of, shares_left_out
 from bumblebee.diagnosis.report.notes import ALONE, far_off, nothing_seen, told_horizon, unseen_notes
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.prediction_error import (
@@ -45,6 +45,7 @@ __all__ = [
     "effect_entries",
     "error_block",
     "error_rows",
+    "errors_of",
     "examples",
     "far_off",
     "figure",

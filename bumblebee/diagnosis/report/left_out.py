@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.report.notes import told_horizon
@@ -38,6 +39,29 @@ def shares_left_out(
     before, after, *others = power[:, np.isfinite(power).all(axis=0)].sum(axis=1)
     gone = before - after
     return [float(np.clip((other - after) / gone, 0.0, 1.0)) if gone > 0 else None for other in others]
+
+
+def errors_of(
+    session: Session, judged: Sequence[int], budget: int, sets: Sequence[Sequence[Effect]]
+) -> NDArray[np.float64]:
+    """Error (S,) of the joints' positions with each set of effects: mean of the horizons' log RMS [rad or m].
+
+    Windows that diverge with any of the sets are left out.
+
+    Args:
+        session: the data.
+        judged: indices of the rollouts.
+        budget: windows of a horizon at most.
+        sets: S sets of effects.
+    """
+    windows = horizon_windows(session, judged, budget).windows
+    models, places = [vary(session.plant, effects) for effects in sets], session.layout.slices["joint_pos"]
+    errors = []
+    for part in windows.values():
+        raw = residuals(session.plant, session.layout, part, models, session.steps[0])[:, :, 0, places]
+        squares = (raw**2).mean(axis=2)
+        errors.append(0.5 * np.log(squares[:, np.isfinite(squares).all(axis=0)].mean(axis=1)))
+    return np.asarray(np.mean(errors, axis=0))
 
 
 def lost_without(effect: Mapping[str, Any]) -> str:
