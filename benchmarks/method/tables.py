@@ -164,7 +164,7 @@ def _changes(out: Path, method: Method, motions: Motions) -> str:
 def _pairs(rows: pd.DataFrame) -> str:
     """Rows less others, where both were tried on the same motions and robots."""
     pairs = [(WHOLE, key) for key in ROWS if key != WHOLE]
-    pairs += [(OWN, BASE), ("physics", LONGER), ("both", "physics"), (LONGER, ONE), (LONGER, RANDOM)]
+    pairs += [(OWN, BASE), ("physics", LONGER), ("physics", ONE), ("both", "physics"), (LONGER, ONE), (LONGER, RANDOM)]
     lines = head(["difference", "motions", *RATES.values(), "p, own place"])
     for split, which in SPLITS.items():
         own = rows[rows["split"] == split]

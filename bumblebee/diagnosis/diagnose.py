@@ -132,7 +132,8 @@ def _harmless(
 ) -> tuple[_Found, dict[str, Any], list[Effect]]:
     """Withdraw one effect after the other until the rest does no harm on held-out rollouts; all where that never is.
 
-    Validation windows, which are not those that judge, say which goes first: that without which they err least.
+    First goes that without which they err least: those that judge choose, too, and the note says so. Validation windows
+    are of the fitted motions and may prefer what does the harm.
 
     Args:
         material: the data.
@@ -149,19 +150,20 @@ def _harmless(
 
     def stands(rest: _Found, left: list[Effect], entries: list[dict[str, Any]]) -> dict[str, Any]:
         gone = withdrawn([effect for effect in effects if effect not in left], "held-out rollouts")
-        return _told(material, config, rest, Findings(left, entries, [*beside.notes, f"{gone}; {errors}"]))
+        chosen = ["the rest was chosen by these rollouts: judge it by new ones"] if left else []
+        note = "; ".join([gone, errors, *chosen])
+        return _told(material, config, rest, Findings(left, entries, [*beside.notes, note]))
 
-    if session.accept:
-        shares = partial(shares_left_out, session, config.report_windows)
-        less = [fit.without([candidate]).effects for candidate in fit.chosen]
-        order = np.argsort(errors_of(session, session.accept, config.report_windows, less), kind="stable")
-        for count in range(1, len(order)):
-            rest = _without(material, found, [fit.chosen[i] for i in order[:count]])
-            left = [*rest.last.fit.effects, *beside.effects]
-            entries = effect_entries(rest.search, rest.last, rest.holdout, rest.beyond, shares)
-            told = stands(rest, left, [*entries, *beside.entries])
-            if not harms(told["summary"]["removed"]):
-                return rest, told, left
+    shares = partial(shares_left_out, session, config.report_windows)
+    less = [fit.without([candidate]).effects for candidate in fit.chosen]
+    order = np.argsort(errors_of(session, session.holdout, config.report_windows, less), kind="stable")
+    for count in range(1, len(order)):
+        rest = _without(material, found, [fit.chosen[i] for i in order[:count]])
+        left = [*rest.last.fit.effects, *beside.effects]
+        entries = effect_entries(rest.search, rest.last, rest.holdout, rest.beyond, shares)
+        told = stands(rest, left, [*entries, *beside.entries])
+        if not harms(told["summary"]["removed"]):
+            return rest, told, left
     nothing = _nothing(material, found)
     return nothing, stands(nothing, [], []), []
 
