@@ -15,6 +15,7 @@ from benchmarks.study.settings import freeze
 from benchmarks.study.steps import Places, Runner, Step
 from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.errors import BadInput
+from bumblebee.io.write import write_file
 from bumblebee.last_line import guarded
 
 LATER = "the call is over: the same command goes on"
@@ -73,17 +74,17 @@ def sealed_robots(folder: Path | None) -> dict[str, str]:
 
 def write_table(options: argparse.Namespace) -> None:
     """Write the tables of a run, as far as it is done."""
+    from benchmarks.method.record import below_here, record
     from benchmarks.method.tables import figures, method_tables
 
+    out = below_here(options.out) if options.record else options.out
     method, motions = NAMED[options.settings], read_motions(options.motions)
     stamp = freeze(options.run, method, settings=options.settings, motions=motions.hash)
     text = method_tables(options.run, method, motions, options.robots)
-    options.out.write_text(f"<!-- method {stamp}, motions {motions.hash} -->\n\n{text}")
+    write_file(out, f"<!-- method {stamp}, motions {motions.hash} -->\n\n{text}")
     print(text, end="")
     if options.record:
-        from benchmarks.method.record import record
-
-        run_id = record(options.run, options.out, method, stamp, figures(options.run, method, motions))
+        run_id = record(options.run, out, method, stamp, figures(options.run, method, motions))
         print(f"run {run_id} in the registry of {Path.cwd()}", flush=True)
 
 

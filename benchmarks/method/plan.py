@@ -18,7 +18,7 @@ from benchmarks.method.places import (
     student,
 )
 from benchmarks.method.settings import Method
-from benchmarks.method.students import AHEAD, CHANGED, changed, is_student, student_of
+from benchmarks.method.students import AHEAD, changed, compared, is_student, student_of
 from benchmarks.study.steps import Step
 
 WORK = "benchmarks.method.work"
@@ -53,7 +53,7 @@ class Plan:
         for line in DECLARED_LINES:
             self._tried(student(line))
             self._tried(changed(line, AHEAD))
-        for own in (student(OWN), *(changed(OWN, name) for name in CHANGED)):
+        for own in compared():
             self._tried(own, [])
         for robot in robots:
             for name in ARMS:
@@ -96,7 +96,7 @@ class Plan:
         for line in DECLARED_LINES:
             self._distil(student(line))
             self._distil(changed(line, AHEAD))
-        for own in (student(OWN), *(changed(OWN, name) for name in CHANGED)):
+        for own in compared():
             self._distil(own)
 
     def _record(self, place: Place, needs: Sequence[str]) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks.method.settings import Method
 from bumblebee.errors import BadInput
+from bumblebee.io.write import write_file
 from tasks.lineage import path_hash
 from tasks.registry import log_run
 
@@ -24,27 +25,31 @@ PATTERNS = (
 """Files and folders of a run that its tables depend on."""
 
 
-def record(run: Path, table: Path, method: Method, stamp: str, metrics: dict[str, float]) -> str:
-    """Write `table` and the hashes, which come to lie beside it, as one run; its id in MLflow.
-
-    Args:
-        run: the run's folder.
-        table: Markdown file below the folder one stands in.
-        method: the settings.
-        stamp: hash of what the run was held to.
-        metrics: name -> value.
+def below_here(table: Path) -> Path:
+    """The table as the registry names it, from the working folder.
 
     Raises:
-        BadInput: if the table lies elsewhere, where the registry has no name for it.
+        BadInput: if it lies elsewhere, where the registry has no name for it.
     """
     here = Path.cwd()
     if not table.resolve().is_relative_to(here):
         raise BadInput("--out", f"a file below {here}", str(table), "Leave --record out, or write the table here.")
-    own = table.resolve().relative_to(here)
-    listed = own.with_suffix(".json")
-    listed.write_text(json.dumps(dict(hashes(run)), indent=1) + "\n")
-    tags = {"settings": stamp, "run": str(run)}
-    return log_run("method", None, None, method, metrics, None, tags, [own, listed])
+    return table.resolve().relative_to(here)
+
+
+def record(run: Path, table: Path, method: Method, stamp: str, metrics: dict[str, float]) -> str:
+    """Write the table and the hashes, which come to lie beside it, as one run; its id in MLflow.
+
+    Args:
+        run: the run's folder.
+        table: `below_here`.
+        method: the settings.
+        stamp: hash of what the run was held to.
+        metrics: name -> value.
+    """
+    listed = table.with_name(f"{table.name}.hashes.json")
+    write_file(listed, json.dumps(dict(hashes(run)), indent=1) + "\n")
+    return log_run("method", None, None, method, metrics, None, {"settings": stamp}, [table, listed])
 
 
 def hashes(run: Path) -> Iterator[tuple[str, str]]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from benchmarks.method.places import student
+from benchmarks.method.places import OWN, student
 from benchmarks.method.settings import Method
 from bumblebee.learning.distill import DistillConfig
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
@@ -39,9 +39,11 @@ class Student:
 
 
 USUAL = Student("as in every row")
+AHEAD = "ahead"
+"""The change that every line's experts are distilled with too."""
 CHANGED = {
     "exact": Student("without sensor noise", replace(STUDENT, noise=0.0)),
-    "ahead": Student(
+    AHEAD: Student(
         "also sees the reference .1 and .3 s ahead, its velocities and key bodies", replace(STUDENT, now=("imu",))
     ),
     "seeing": Student(
@@ -53,13 +55,14 @@ CHANGED = {
 """Students that differ from the usual one in one thing each."""
 
 
-AHEAD = "ahead"
-"""The change that every line's experts are distilled with too."""
-
-
 def changed(line: str, name: str) -> str:
     """Folder of a line's changed student."""
     return f"{student(line)}-{name}"
+
+
+def compared() -> dict[str, Student]:
+    """Students of the experts before any round, by folder: the usual one, and each that is changed."""
+    return {student(OWN): USUAL} | {changed(OWN, name): each for name, each in CHANGED.items()}
 
 
 def student_of(folder: str) -> tuple[str, Student]:

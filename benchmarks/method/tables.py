@@ -10,7 +10,7 @@ import pandas as pd
 
 from benchmarks.method.places import ARMS, BASE, GENERAL, LONGER, ONE, OWN, RANDOM, TOGETHER, Place, arm, student
 from benchmarks.method.settings import Method
-from benchmarks.method.students import AHEAD, CHANGED, USUAL, changed
+from benchmarks.method.students import AHEAD, changed, compared
 from benchmarks.study.motions import Motions
 from benchmarks.study.tables import (
     RATES,
@@ -60,7 +60,7 @@ def method_tables(out: Path, method: Method, motions: Motions, robots: Path | No
             own = rows[rows["on"] == robot]
             if not own.empty:
                 parts.append(f"### {what}, {robot} robots\n\n{methods_table(own, ROWS, 'row')}\n{_pairs(own)}")
-        if folder is student:
+        if folder is student and any((out / who / "tried-0.csv").exists() for who in compared()):
             parts.append(f"### Transformers with one thing changed, declared robot\n\n{_changes(out, method, motions)}")
     if names:
         parts.append(
@@ -138,16 +138,12 @@ def _who(
 
 def _changes(out: Path, method: Method, motions: Motions) -> str:
     """The students of the experts before any round: KL at the end, success in the own place, what the change brings."""
-    folders = {student(OWN): USUAL} | {changed(OWN, name): each for name, each in CHANGED.items()}
-    tables = {OWN: read(out, OWN, "tried", method, motions)}
-    tables |= {who: read(out, who, "tried", method, motions) for who in folders}
+    tables = {who: read(out, who, "tried", method, motions) for who in (OWN, *compared())}
     tried = [table.assign(arm=who, seed=0) for who, table in tables.items() if table is not None]
     lines = head(["student", "KL", *(f"{which}{told}" for which in SPLITS.values() for told in _CHANGE)])
-    if not tried:
-        return ""
     rows = pd.concat(tried, ignore_index=True)
     rows = rows[rows["robot"] == "declared"]
-    for who, each in folders.items():
+    for who, each in compared().items():
         if tables[who] is None:
             continue
         cells = [each.told, f"{json.loads((out / who / 'done.json').read_text())['kl']:.1f}"]

@@ -132,8 +132,8 @@ def _harmless(
 ) -> tuple[_Found, dict[str, Any], list[Effect]]:
     """Withdraw one effect after the other until the rest does no harm on held-out rollouts; all where that never is.
 
-    First goes that without which they err least: those that judge choose, too, and the note says so. Validation windows
-    are of the fitted motions and may prefer what does the harm.
+    First goes that without which they err least: those that judge choose, too, and the note says so. On the robot where
+    validation rollouts were asked instead, what did the harm would have gone last (docs/results/method.md).
 
     Args:
         material: the data.

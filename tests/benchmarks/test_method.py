@@ -148,12 +148,15 @@ def recorded_with_hashes(folder: Path, out: Path, robots: Path, monkeypatch: pyt
     given = [str(out), "--motions", str(folder), "--robots", str(robots), "--settings", "small", "--record"]
     with pytest.raises(BadInput, match="--out: expected a file below"):
         command.write_table(command.parse(["table", *given, "--out", str(folder.parent / "elsewhere.md")]))
+    assert not (folder.parent / "elsewhere.md").exists()
     command.write_table(command.parse(["table", *given, "--out", "method.md"]))
     client = prepare()
     experiment = client.get_experiment_by_name(experiment_name())
     assert experiment is not None
     (run,) = client.search_runs([experiment.experiment_id], "tags.stage = 'method'")
-    listed = json.loads(Path(client.download_artifacts(run.info.run_id, "method.json", str(folder))).read_text())
+    listed = json.loads(
+        Path(client.download_artifacts(run.info.run_id, "method.md.hashes.json", str(folder))).read_text()
+    )
     assert listed["robot-0/delta/r1/c0/policy.pt"] == path_hash(out / "robot-0/delta/r1/c0/policy.pt")
     assert listed["robot-0/own/r1/record-0"].endswith(".dir")
     assert 0 <= run.data.metrics["Transformers/sealed/held out/BumbleBee"] <= 1

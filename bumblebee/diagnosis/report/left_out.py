@@ -46,7 +46,7 @@ def errors_of(
 ) -> NDArray[np.float64]:
     """Error (S,) of the joints' positions with each set of effects: mean of the horizons' log RMS [rad or m].
 
-    Windows that diverge with any of the sets are left out.
+    Windows that diverge with any of the sets are left out; zeros where no window is left.
 
     Args:
         session: the data.
@@ -60,8 +60,10 @@ def errors_of(
     for part in windows.values():
         raw = residuals(session.plant, session.layout, part, models, session.steps[0])[:, :, 0, places]
         squares = (raw**2).mean(axis=2)
-        errors.append(0.5 * np.log(squares[:, np.isfinite(squares).all(axis=0)].mean(axis=1)))
-    return np.asarray(np.mean(errors, axis=0))
+        good = np.isfinite(squares).all(axis=0)
+        if good.any():
+            errors.append(0.5 * np.log(squares[:, good].mean(axis=1)))
+    return np.asarray(np.mean(errors, axis=0)) if errors else np.zeros(len(sets))
 
 
 def lost_without(effect: Mapping[str, Any]) -> str:
