@@ -1,5 +1,6 @@
 """Unitree's DDS on loopback: what goes out at one end comes in at the other, and a second controller is heard."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,6 +29,7 @@ class Wire:
         for _ in range(1000):
             if done():
                 return
+            time.sleep(0.01)  # ends go by the clock, and an exchange takes less than 1 ms
             self.stamp_ms += 10
             self.robot.send(STATE, state_message(self.stamp_ms))
             self.controller.wait(0.01)
