@@ -55,7 +55,7 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 	@# On all cores, as pip does on one, but for what is hardly ever imported; templates may not compile.
 	@echo "make setup: compiling"
 	@$(BIN)/python -m compileall -qq -j 0 -x '/tests/|/transformers/models/' $(VENV)/lib bumblebee tasks flows || true
-	$(BIN)/python -m tasks.private
+	$(BIN)/python -m tasks.lab.private
 	@touch $@
 
 # A gate that waits for an answer (status 3) is no error; scripts that must know call python -m flows.demo themselves.
@@ -68,7 +68,7 @@ smoke: setup  ## the loop with tiny budgets, in runs/smoke
 	@$(BIN)/python -m flows.demo --profile smoke --name $(or $(NAME),smoke) $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)
 
 serve: setup  ## open both servers again, with runs started and resumed from Prefect's pages; NAME=<workspace under runs/>
-	@$(BIN)/python -m flows.serve $(if $(NAME),--name "$(NAME)") $(PORTS)
+	@$(BIN)/python -m flows.servers.serve $(if $(NAME),--name "$(NAME)") $(PORTS)
 
 test: setup check  ## style, import rule, unit tests, the loop end to end; the slow suites are left to test-all
 	$(TESTS) -m "not slow"

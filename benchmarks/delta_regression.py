@@ -20,10 +20,6 @@ import torch
 
 from benchmarks.study.motions import read_motions
 from benchmarks.study.on_robot import KEY, exported, run_on_robot
-from bumblebee.deploy.episodes import Episode
-from bumblebee.deploy.stand_in import BASES
-from bumblebee.deploy.stand_in_effects import SCHEMA, entry, seal
-from bumblebee.deploy.undeclared.kinds import KINDS
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.thinning import thin
 from bumblebee.io.write import write_file
@@ -31,10 +27,14 @@ from bumblebee.learning.delta import DeltaConfig, compare, learn_delta, replay_e
 from bumblebee.learning.pretrained import FOLDER
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion.clip import Clip
+from bumblebee.policy.episodes import Episode
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
+from bumblebee.stand_in.process import BASES
+from bumblebee.stand_in.sealed import SCHEMA, entry, seal
+from bumblebee.stand_in.undeclared.kinds import KINDS
+from tasks.on_robot.stand_in import cut
 from tasks.seal import drawn_place
-from tasks.stand_in import cut
 
 ANKLES = ("left_ankle_pitch_joint", "right_ankle_pitch_joint")
 ROBOTS: dict[str, tuple[tuple[str, str, float], ...]] = {

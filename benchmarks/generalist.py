@@ -20,9 +20,9 @@ import torch
 
 from bumblebee.last_line import guarded
 from bumblebee.learning import pretrained
-from bumblebee.learning.distill import DistillConfig
+from bumblebee.learning.generalist.distill import DistillConfig
+from bumblebee.learning.generalist.teacher_student import generalist_of
 from bumblebee.learning.policy import Policy, load_policy
-from bumblebee.learning.teacher_student import generalist_of
 from bumblebee.learning.trial import World, success_by_family, try_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import make_library

@@ -26,14 +26,14 @@ from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.trial import Trials, World, try_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import make_library
-from bumblebee.motion.filter import filter_clips
+from bumblebee.motion.filters.rules import filter_clips
 from bumblebee.sim.effects import add_to_spec, runtime_hooks, single
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model, load_spec
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
-from tasks import params
+from bumblebee.tracking.sampling.library import MotionLibrary
 from tasks.refine import RefineConfig
+from tasks.settings import params
 
 HOME = Path(__file__).parents[1]
 DEMO = [

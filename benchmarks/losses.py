@@ -26,7 +26,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import KEY_BODIES
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 from bumblebee.tracking.terminations import fallen
 
 BACK = (0.5, 1.0, 2.0)  # s before the loss that the robot starts again

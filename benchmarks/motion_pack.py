@@ -19,10 +19,10 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import make_library
-from bumblebee.motion.filter import filter_clips
-from bumblebee.motion.folder import read_folder
+from bumblebee.motion.filters.rules import filter_clips
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.pieces import hold_out, motion_of
+from bumblebee.motion.reading.folder import read_folder
 
 EMBEDDED, EMBEDDED_SHARE = "embedded", 0.15  # the demo's own split
 FPS = 50.0

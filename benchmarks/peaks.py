@@ -1,6 +1,6 @@
 """How much each joint of the declared G1 does under the shipped policy: what limits in the stand-in are measured by.
 
-`python -m benchmarks.peaks --out bumblebee/deploy/undeclared/peaks.yaml`: the shipped policy follows every embedded
+`python -m benchmarks.peaks --out bumblebee/stand_in/undeclared/peaks.yaml`: the shipped policy follows every embedded
 motion on the stand-in without effects, from the motion's own start, without sensor noise. Of each motion the largest
 torque, speed and change of the target are taken, and of these the median over the motions: a limit below it is felt in
 half of them.
@@ -12,18 +12,18 @@ from pathlib import Path
 
 import numpy as np
 
-from bumblebee.deploy.episodes import start_states
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.robots import CONTROL_HZ
-from bumblebee.deploy.runner import PolicyRunner, reference_library
-from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.learning import pretrained
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import load_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.policy.episodes import start_states
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.robots import CONTROL_HZ
+from bumblebee.policy.runner import PolicyRunner, reference_library
 from bumblebee.robot.facts import joint_names
+from bumblebee.stand_in.body import StandInRobots
 
 HEAD = """# Median over the embedded motions of each motion's peak under the shipped policy on the declared G1, from
 # `python -m benchmarks.peaks`: [torque of the drive N m, speed rad/s, change of the target rad/s].

@@ -20,14 +20,14 @@ from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from bumblebee.report.held_out import error_line
 from bumblebee.report.names import label, reference
-from bumblebee.report.opening import effect_rows
 from bumblebee.report.results import LoopResults
-from bumblebee.report.success_steps import step_differences, success_steps
+from bumblebee.report.sections.opening import effect_rows
+from bumblebee.report.sections.success_steps import step_differences, success_steps
 from bumblebee.report.truth import hits
 from bumblebee.report.wording import percent
 from flows import workspace as workspaces
-from tasks import paths
 from tasks.report import collect
+from tasks.running import paths
 from tasks.sections import loop
 
 NAME = "figures"

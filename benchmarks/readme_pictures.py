@@ -14,24 +14,24 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from bumblebee.deploy.compensation_plan import compensate
-from bumblebee.deploy.episodes import Episode, run_episodes
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.sensors import NO_NOISE
-from bumblebee.deploy.stand_in_effects import declared_g1, entry
-from bumblebee.deploy.stand_in_robots import StandInRobots
-from bumblebee.deploy.undeclared.faults import peaks
-from bumblebee.deploy.undeclared.kinds import KINDS, Place
+from bumblebee.compensation.plan import compensate
 from bumblebee.last_line import guarded
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
-from bumblebee.report.film_file import write_film
-from bumblebee.report.filmstrip import states
-from bumblebee.report.render import render_frames
+from bumblebee.policy.episodes import Episode, run_episodes
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.report.films.film_file import write_film
+from bumblebee.report.films.filmstrip import states
+from bumblebee.report.films.render import render_frames
 from bumblebee.robot.model import build_spec
+from bumblebee.robot.sensors import NO_NOISE
 from bumblebee.sim.effects import Effect, read_effects
+from bumblebee.stand_in.body import StandInRobots
+from bumblebee.stand_in.sealed import declared_g1, entry
+from bumblebee.stand_in.undeclared.faults import peaks
+from bumblebee.stand_in.undeclared.kinds import KINDS, Place
 from bumblebee.view.shipped import shipped_policy
 
 HOME = Path(__file__).parent.parent / "docs" / "pictures"

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from benchmarks.throughput.measure import timed
-from bumblebee.learning.teacher_student import make_env
+from bumblebee.learning.generalist.teacher_student import make_env
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.env import TrackingEnv

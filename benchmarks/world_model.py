@@ -16,18 +16,19 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.baselines.__main__ import SETTINGS, Clock, _tell, keep_actor, main, make_env, training_clips
+from benchmarks.baselines.__main__ import SETTINGS, main, make_env, training_clips
+from benchmarks.baselines.calls import Clock, keep_actor, tell
 from benchmarks.baselines.methods import RANDOMISATIONS, changed, method
 from benchmarks.baselines.trial import Tried, report
 from benchmarks.motion_pack import read_pack
-from bumblebee.baselines.trial import Manner
 from bumblebee.errors import BadInput
 from bumblebee.learning.learner import CURVE
 from bumblebee.learning.ranks import check_gpus, join, launch, leave, started_together, this_command
+from bumblebee.learning.rollout import Manner
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.reflection import reflected
+from bumblebee.tracking.sampling.reflection import reflected
 
 _ENDLESS, _FIRST = 10**9, 10
 _SAVE_EVERY, _TELL_EVERY = 120.0, 20.0  # s
@@ -99,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
             total = now + max(round(left * (now - began + 1) / (seconds - before + 0.1)), 1)
             trainer.config = replace(trainer.config, iterations=total)
         if clock.due("tell", _TELL_EVERY):
-            _tell(options.out / CURVE)
+            tell(options.out / CURVE)
         if options.gpus == 1 and clock.due("save", _SAVE_EVERY):  # the ranks must save together
             trainer.save_checkpoint()
         if ranks.first:

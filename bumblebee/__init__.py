@@ -6,7 +6,7 @@ The functions of `bumblebee.api` are offered here and imported when they are use
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 DISTRIBUTION = "bumblebee-humanoid"
 """Name of the installed distribution; `bumblebee` is another project's on the package index."""
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from bumblebee import __version__
-from bumblebee.commands import COMMANDS, Commands, missing
+from bumblebee.commands.table import COMMANDS, Commands, missing
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.io.there import require_logs
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
@@ -81,7 +81,7 @@ def diagnose(
     from bumblebee.diagnosis.report import examples, plot, summary
     from bumblebee.diagnosis.simulation import Stop
     from bumblebee.first_signal import first_signal
-    from bumblebee.report.windows import windows_inlay
+    from bumblebee.report.replays.windows import windows_inlay
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
@@ -218,10 +218,10 @@ def compensate(
     overwrite: Overwrite = False,
 ) -> None:
     """List what a policy's runner can undo at the joints of the G1, without training; no other robot has a runner."""
-    from bumblebee.deploy.compensation_evidence import require_proven
-    from bumblebee.deploy.compensation_file import claim_compensation, table_of, write_compensation
-    from bumblebee.deploy.compensation_plan import compensate_file
-    from bumblebee.deploy.compensation_robot import require_g1
+    from bumblebee.compensation.evidence import require_proven
+    from bumblebee.compensation.file import claim_compensation, table_of, write_compensation
+    from bumblebee.compensation.plan import compensate_file
+    from bumblebee.compensation.robot import require_g1
 
     claim_compensation(out, overwrite, [path for path in (effects, model) if path])
     require_g1(effects, model)

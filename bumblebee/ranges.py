@@ -1,7 +1,7 @@
 """Ranges beside the fields of settings: `Annotated[float, Range(above=0, most=1)]`, held whoever makes an instance.
 
-A settings class is a frozen dataclass on top of `Ranged`. `tasks.params` holds what a file says to the same ranges, and
-names the key. NaN and infinities are in no range.
+A settings class is a frozen dataclass on top of `Ranged`. `tasks.settings.params` holds a file to the same ranges,
+and names the key. NaN and infinities are in no range.
 """
 
 import math

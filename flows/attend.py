@@ -12,7 +12,7 @@ from types import FrameType
 
 from flows.environment import environment
 from flows.processes import end_tree
-from flows.servers import HOME, Addresses
+from flows.servers.servers import HOME, Addresses
 
 LOOK_EVERY = 0.2  # [s]
 WALK = [sys.executable, "-m", "flows.walk"]

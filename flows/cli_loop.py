@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from bumblebee.cli_view import PORT, Meshes, Port, Ticks, play_shipped_policy
+from bumblebee.commands.view import PORT, Meshes, Port, Ticks, play_shipped_policy
 from bumblebee.errors import BadInput
 
 Name = Annotated[str, typer.Option("--name", help="Workspace under runs/; without, the checkout itself.")]
@@ -50,7 +50,7 @@ def serve(
     """Open Prefect and MLflow on loopback until Ctrl-C, as `make serve` does."""
     require_checkout("serve")
     from bumblebee.last_line import guarded
-    from flows.serve import started
+    from flows.servers.serve import started
 
     both = {"prefect_port": prefect_port, "mlflow_port": mlflow_port}
     raise typer.Exit(guarded(lambda: started(argparse.Namespace(name=name, workspace=workspace, **both))))
@@ -61,7 +61,7 @@ def report(name: Name = "") -> None:
     require_checkout("report")
     from flows.environment import environment
     from flows.workspace import named
-    from tasks import paths
+    from tasks.running import paths
 
     folder = named(name)
     if not (folder / paths.PUBLISHED).exists():
@@ -81,7 +81,7 @@ def fetch(
     server: Annotated[str, typer.Option("--server", help="MLflow's address, in place of a workspace.")] = "",
 ) -> None:
     """Copy a registered policy with its card and lineage; no server needs to run."""
-    from tasks.fetch import main
+    from tasks.policies.fetch import main
 
     options = ["--out", str(out), "--workspace", str(workspace), *(["--server", server] if server else [])]
     raise typer.Exit(main([model, *options]))

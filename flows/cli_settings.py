@@ -20,7 +20,7 @@ def settings(
     The file that one edits is params.yaml, in the checkout or in runs/NAME/.
     """
     from bumblebee.errors import BadInput
-    from tasks.params import SECTIONS, nearest
+    from tasks.settings.params import SECTIONS, nearest
 
     if section:
         first = section.split(".")[0]
@@ -40,7 +40,7 @@ def _under(key: str, section: str) -> bool:
 
 
 def _class(section: str) -> type:
-    from tasks.params import SECTIONS
+    from tasks.settings.params import SECTIONS
 
     module, _, name = SECTIONS[section].partition(":")
     return getattr(import_module(module), name)

@@ -16,11 +16,12 @@ from flows.ending import login_of, registry, serve, shown, summarise
 from flows.environment import environment
 from flows.gpus import require as require_gpus
 from flows.owned import require_own
-from flows.servers import Addresses, require_port, servers
+from flows.servers.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
-from tasks import params, sections
-from tasks.lab import on_cluster
-from tasks.private import private_index
+from tasks import sections
+from tasks.lab.private import private_index
+from tasks.lab.servers import on_cluster
+from tasks.settings import params
 
 EXIT_WAITING = 3
 NULL = "null"  # the seed of a robot without undeclared effects
@@ -147,7 +148,7 @@ def start_check(folder: Path) -> "subprocess.Popen[str]":
 def check_cluster(folder: Path) -> None:
     """Look at the lab's Ray cluster, where there is one, in a process that does not stay its client."""
     if on_cluster(folder):
-        command = [sys.executable, "-m", "flows.ray_cluster"]
+        command = [sys.executable, "-m", "flows.cluster.ray_cluster"]
         if status := subprocess.run(command, cwd=folder, env=environment(folder), check=False).returncode:
             raise SystemExit(status)
 

@@ -8,10 +8,11 @@ import shlex
 from pathlib import Path
 
 from bumblebee.measured.gate_words import program
-from flows import login, servers
 from flows.environment import SERVERS
-from flows.first_look import MODELS
-from tasks import paths
+from flows.people import login
+from flows.servers import servers
+from flows.servers.first_look import MODELS
+from tasks.running import paths
 
 
 def summarise(folder: Path) -> None:

@@ -4,9 +4,9 @@ import os
 import sys
 from pathlib import Path
 
-from flows import login
-from tasks.lab import read_lab
-from tasks.private import INDEX
+from flows.people import login
+from tasks.lab.private import INDEX
+from tasks.lab.servers import read_lab
 
 SERVERS = ".servers"  # folder of the workspace with both servers' databases, logs and addresses
 

@@ -2,13 +2,14 @@
 
 import heapq
 import json
-import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+from bumblebee.errors import BadInput
+from bumblebee.io.write import write_file
 from flows.environment import SERVERS
 from flows.stages import Stage
 
@@ -58,14 +59,8 @@ def remember(workspace: Path, name: str, seconds: float) -> None:
     """Add a stage's duration; a folder that cannot be written costs the memory and nothing else."""
     table = read(workspace)
     table[name] = [*table.get(name, []), round(seconds, 2)][-KEPT:]
-    part = path(workspace).with_suffix(".part")
-    try:
-        part.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(json.dumps(table, indent=1, sort_keys=True))
-        os.replace(part, path(workspace))
-    except OSError:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+    with suppress(BadInput):
+        write_file(path(workspace), json.dumps(table, indent=1, sort_keys=True))
 
 
 def expect(stages: Iterable[Stage], earlier: Mapping[str, list[float]], seen: Mapping[str, float]) -> Expectation:

@@ -18,7 +18,7 @@ from typing import Any
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
 from flows.stages import kind_of
-from tasks import params
+from tasks.settings import params
 
 VARIABLE = "CUDA_VISIBLE_DEVICES"
 _users: Counter[str] = Counter()  # stages that run on each device

@@ -23,14 +23,15 @@ from prefect.task_runners import TaskRunner, ThreadPoolTaskRunner
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import full_disk
-from flows import gate_question, gpus, progress
+from flows import gpus, progress
 from flows.environment import SERVERS, environment, without_login
+from flows.gates import gate_question
 from flows.owned import require_own
 from flows.runs import recorded
 from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
 from flows.terminal import NOTICE, took
-from tasks import params
-from tasks.lab import on_cluster
+from tasks.lab.servers import on_cluster
+from tasks.settings import params
 
 ON_CLUSTER = 32  # stages that may wait for a machine at once; each is a process here
 KEPT = 5  # last lines of a failed stage that its error repeats
@@ -87,7 +88,7 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
 
 def runner_of(workspace: Path) -> str:
     """The module that brings a stage up to date: on this machine, or on one of the lab's Ray cluster."""
-    return "flows.away" if on_cluster(workspace) else "flows.reproduce"
+    return "flows.cluster.away" if on_cluster(workspace) else "flows.reproduce"
 
 
 def devices_of(workspace: Path, stage: str) -> AbstractContextManager[dict[str, str]]:

@@ -7,9 +7,9 @@ from pathlib import Path
 if __name__ == "__main__" and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # while DVC is imported, Ctrl-C ends it without a word
 
-from flows.rwlock import clear_cut_off
-from tasks import lock_file
-from tasks.parent import end_with_parent
+from flows.servers.rwlock import clear_cut_off
+from tasks.running import lock_file
+from tasks.running.parent import end_with_parent
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from flows import login
+from flows.people import login
 from flows.processes import born, same
 
 UNFINISHED = ["RUNNING", "PENDING", "CANCELLING"]  # a suspended run (PAUSED) has no process, and needs none

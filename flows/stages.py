@@ -16,8 +16,8 @@ from rich.table import Table
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
-from flows.rwlock import clear_cut_off
-from tasks import lock_file
+from flows.servers.rwlock import clear_cut_off
+from tasks.running import lock_file
 
 WIDTH = 100
 STALE, AFTER, LACKS, DONE = "stale", "after a stale one", "waits for", "up to date"

@@ -17,7 +17,7 @@ from bumblebee.last_line import unforeseen
 from flows import terminal
 from flows import workspace as workspaces
 from flows.owned import require_own
-from tasks.parent import end_with_parent
+from tasks.running.parent import end_with_parent
 
 EXIT_FAILED, EXIT_WAITING = 1, 3
 

@@ -13,10 +13,11 @@ import yaml
 import bumblebee
 from bumblebee.errors import BadInput
 from flows.environment import environment
-from tasks import params, paths
-from tasks.filter_files import files_named
-from tasks.lab import FILE as LAB
-from tasks.private import private_index
+from tasks.lab.private import private_index
+from tasks.lab.servers import FILE as LAB
+from tasks.running import paths
+from tasks.settings import params
+from tasks.settings.filter_files import files_named
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")

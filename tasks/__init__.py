@@ -5,9 +5,9 @@ import signal
 
 if "DVC_STAGE" in os.environ:
     # Before the stage's imports, which take seconds: a loop that is killed meanwhile must not leave it behind.
-    from tasks.parent import end_with_parent
+    from tasks.running.parent import end_with_parent
 
     end_with_parent()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        # While it imports, Ctrl-C ends it without a word; `tasks.stage.run_stage` answers it in one line.
+        # While it imports, Ctrl-C ends it without a word; `tasks.running.stage.run_stage` answers it in one line.
         signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -6,9 +6,9 @@ from typing import Literal
 from bumblebee.learning import pretrained
 from bumblebee.learning.trial import World
 from bumblebee.sim.sensors import load_model
-from tasks import paths
-from tasks.stage import load, run_stage
-from tasks.training import Job, TrainingConfig, train_policy, training_clips
+from tasks.policies.training import Job, TrainingConfig, train_policy, training_clips
+from tasks.running import paths
+from tasks.running.stage import load, run_stage
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from bumblebee.files import save_tensors
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.progress import progress
-from tasks import paths
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage
 from tasks.sections import loop
-from tasks.stage import load, log_run, output_folder, run_stage
 
 MLFLOW = re.compile(r"[^A-Za-z0-9_./ -]")  # what it takes in no name
 _AT_ONCE = 256  # clips in memory while their features are made

@@ -7,17 +7,17 @@ Effects that no drive can undo, or only beyond a limit, are left out here; the p
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bumblebee.deploy.compensation import Compensation, PlannedEffect
-from bumblebee.deploy.compensation_evidence import why_unproven
-from bumblebee.deploy.compensation_file import table_of, write_compensation
-from bumblebee.deploy.compensation_limits import CompensationLimits
-from bumblebee.deploy.compensation_plan import compensate
+from bumblebee.compensation.evidence import why_unproven
+from bumblebee.compensation.file import table_of, write_compensation
+from bumblebee.compensation.limits import CompensationLimits
+from bumblebee.compensation.numbers import Compensation, PlannedEffect
+from bumblebee.compensation.plan import compensate
 from bumblebee.io.read import file_hash, read_json
 from bumblebee.ranges import Ranged
 from bumblebee.sim.effects import Effect, read_effects
-from tasks import paths
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage
 from tasks.sections import parent_of
-from tasks.stage import load, log_run, output_folder, run_stage
 
 
 @dataclass(frozen=True)

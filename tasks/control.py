@@ -14,14 +14,14 @@ from bumblebee.learning.delta import DeltaConfig, action_adapter, save_delta
 from bumblebee.learning.trial import World
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.observations import action_scale
-from tasks import paths
-from tasks.control_config import ControlConfig
+from bumblebee.tracking.observing.observations import action_scale
 from tasks.delta import card, declared, train
+from tasks.policies.training import Job, cluster_clips, train_policy
 from tasks.refine import RefineConfig
+from tasks.running import paths
+from tasks.running.stage import load, output_folder, run_stage
 from tasks.sections import parent_of
-from tasks.stage import load, output_folder, run_stage
-from tasks.training import Job, cluster_clips, train_policy
+from tasks.settings.control_config import ControlConfig
 
 Adapter = Callable[[RobotState, torch.Tensor, torch.Tensor], torch.Tensor]
 

@@ -31,10 +31,10 @@ from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.sim.engine import Engine
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
-from tasks import paths
-from tasks.diagnosis_split import split
-from tasks.run_form import milliseconds
-from tasks.stage import load, log_run, output_folder, run_stage
+from tasks.on_robot.diagnosis_split import split
+from tasks.running import paths
+from tasks.running.run_form import milliseconds
+from tasks.running.stage import load, log_run, output_folder, run_stage
 
 _WORLDS_TO_JUDGE = 64
 

@@ -11,10 +11,10 @@ from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.report import summary
 from bumblebee.ranges import Range, Ranged, Seed
-from bumblebee.report.windows import windows_inlay
-from tasks import paths
-from tasks.run_form import Metric, milliseconds
-from tasks.stage import load, log_run, output_folder, run_stage
+from bumblebee.report.replays.windows import windows_inlay
+from tasks.running import paths
+from tasks.running.run_form import Metric, milliseconds
+from tasks.running.stage import load, log_run, output_folder, run_stage
 
 Windows = Annotated[int, Range(least=8, most=100_000)]
 

@@ -11,8 +11,8 @@ import pandas as pd
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import action_adapter, load_delta, of_clusters
-from bumblebee.learning.distill import DistillConfig, Distiller
 from bumblebee.learning.export import export_policy
+from bumblebee.learning.generalist.distill import DistillConfig, Distiller
 from bumblebee.learning.policy import Policy, Shape, load_policy
 from bumblebee.learning.trial import World, success_by_family, try_policy
 from bumblebee.motion.clip import Clip
@@ -23,13 +23,13 @@ from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import ActionAdapter, TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.observations import action_scale
-from bumblebee.tracking.sampler import ClipShares
-from tasks import paths
+from bumblebee.tracking.observing.observations import action_scale
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.sampling.sampler import ClipShares
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage, scratch
 from tasks.sections import loop
-from tasks.stage import load, log_run, output_folder, run_stage, scratch
 
 
 def main() -> None:

@@ -14,11 +14,6 @@ from typing import Annotated, Any
 
 import pandas as pd
 
-from bumblebee.deploy.episodes import FALL_RULE, Episode, run_episodes
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.robots import NominalRobots
-from bumblebee.deploy.sensors import NO_NOISE, SensorNoise
-from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.contract import (
     Contract,
@@ -35,13 +30,18 @@ from bumblebee.evaluation.thinning import thin
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
+from bumblebee.policy.episodes import FALL_RULE, Episode, run_episodes
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.robots import NominalRobots
 from bumblebee.progress import progress
 from bumblebee.ranges import Count, Few, Line, Name, Range, Ranged, Seed, Size
-from tasks import paths
-from tasks.candidates import Candidate, candidates, chain, same
-from tasks.params import FILE
-from tasks.stage import load, log_run, output_folder, run_stage
-from tasks.stand_in import cut, start_stand_in
+from bumblebee.robot.sensors import NO_NOISE, SensorNoise
+from bumblebee.stand_in.body import StandInRobots
+from tasks.on_robot.stand_in import cut, start_stand_in
+from tasks.policies.candidates import Candidate, candidates, chain, same
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage
+from tasks.settings.params import FILE
 
 ENGINES = ("nominal", "stand_in")
 

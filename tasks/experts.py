@@ -7,9 +7,9 @@ from bumblebee.learning.trial import World
 from bumblebee.ranges import PartOf
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
-from tasks import paths
-from tasks.stage import load, run_stage
-from tasks.training import Job, TrainingConfig, cluster_clips, train_policy
+from tasks.policies.training import Job, TrainingConfig, cluster_clips, train_policy
+from tasks.running import paths
+from tasks.running.stage import load, run_stage
 
 
 @dataclass(frozen=True)

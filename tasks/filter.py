@@ -14,17 +14,17 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.filter import FilterConfig, violations
 from bumblebee.motion.filters.decisions import Accounting, Decision, accounting, decisions_table, drops_table
 from bumblebee.motion.filters.overrule import by_clip, read_overrules
+from bumblebee.motion.filters.rules import FilterConfig, violations
 from bumblebee.motion.store import Library, map_clips, write_library
 from bumblebee.progress import progress
 from bumblebee.ranges import Line
-from tasks import paths
-from tasks.filter_files import files_named
-from tasks.params import FILE
-from tasks.policy_filter import PolicyFilter, loaded, unfollowed
-from tasks.stage import load, log_run, output_folder, run_stage
+from tasks.policies.policy_filter import PolicyFilter, loaded, unfollowed
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage
+from tasks.settings.filter_files import files_named
+from tasks.settings.params import FILE
 
 PIPELINE = Path("dvc.yaml")
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
-from tasks import paths
-from tasks.params import load
-from tasks.stage import log_run, run_stage
+from tasks.running import paths
+from tasks.running.stage import log_run, run_stage
+from tasks.settings.params import load
 
 EXIT_PENDING, EXIT_REJECTED = 3, 4
 TO_ANSWER = {verb: f"to {verb} this and nothing else" for verb in ("approve", "reject")}

@@ -19,8 +19,8 @@ from bumblebee.measured.summary import summary_table
 from bumblebee.progress import progress
 from bumblebee.ranges import Line, Name, Range, Ranged
 from bumblebee.robot.model import write_xml
-from tasks import paths
-from tasks.stage import load, log_run, output_folder, run_stage
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,16 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
-from bumblebee.motion.few_lines import said_of
-from bumblebee.motion.folder import ReadConfig, Reading, read_each, skipped_table
 from bumblebee.motion.pieces import held_out
+from bumblebee.motion.reading.few_lines import said_of
+from bumblebee.motion.reading.folder import ReadConfig, Reading, read_each, skipped_table
+from bumblebee.motion.reading.walk import motion_sources
 from bumblebee.motion.store import Library, LibraryWriter, read_index, write_library
-from bumblebee.motion.walk import motion_sources
 from bumblebee.progress import progress
 from bumblebee.ranges import Name, PartOf, Ranged, Unfit
-from tasks import paths
-from tasks.stage import load, log_run, output_folder, run_stage, scratch
-from tasks.watched import require_watched
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage, scratch
+from tasks.settings.watched import require_watched
 
 EMBEDDED = "embedded"
 CONTROL_HZ = 50.0

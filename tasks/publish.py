@@ -9,20 +9,21 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import compare
 from bumblebee.measured import gate, gate_words
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.ranges import Ranged
-from tasks import paths, registry
-from tasks.came_along import came_along
-from tasks.lineage import path_hash
-from tasks.model_card import Evaluated, licences_of, model_card
-from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
-from tasks.promotion_gate import Promotion, PromotionConfig, settle
-from tasks.rollouts_config import RolloutsConfig
+from tasks import registry
+from tasks.policies.came_along import came_along
+from tasks.policies.model_card import Evaluated, licences_of, model_card
+from tasks.promotion.gate import Promotion, PromotionConfig, settle
+from tasks.promotion.rule import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
+from tasks.running import paths
+from tasks.running.lineage import path_hash
+from tasks.running.stage import load, log_run, output_file, run_stage
 from tasks.sections import Loop, loop
-from tasks.stage import load, log_run, output_file, run_stage
+from tasks.settings.rollouts_config import RolloutsConfig
 
 
 @dataclass(frozen=True)

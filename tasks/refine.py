@@ -11,12 +11,12 @@ from bumblebee.learning.trial import World
 from bumblebee.sim.effects import read_effects, runtime_hooks
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.observations import action_scale
-from tasks import paths
+from bumblebee.tracking.observing.observations import action_scale
 from tasks.experts import ExpertsConfig
+from tasks.policies.training import Job, cluster_clips, keep, train_policy
+from tasks.running import paths
+from tasks.running.stage import load, run_stage
 from tasks.sections import parent_of
-from tasks.stage import load, run_stage
-from tasks.training import Job, cluster_clips, keep, train_policy
 
 
 @dataclass(frozen=True)

@@ -16,23 +16,23 @@ from bumblebee.measured.rollout import read_rollout
 from bumblebee.measured.wire_note import noted_latency
 from bumblebee.motion.store import read_index
 from bumblebee.ranges import Line, Ranged, Seed
-from bumblebee.report.clusters_section import clusters_section
-from bumblebee.report.data_sections import motions_section
-from bumblebee.report.loop_picture import Box, loop_picture
+from bumblebee.report.charts.loop_picture import Box, loop_picture
 from bumblebee.report.names import reference, same_files
-from bumblebee.report.opening import headline, opening, opening_lines
 from bumblebee.report.page import render
-from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.results import LoopResults, RoundResults
-from bumblebee.report.round_sections import round_section
+from bumblebee.report.sections.clusters_section import clusters_section
+from bumblebee.report.sections.data_sections import motions_section
+from bumblebee.report.sections.opening import headline, opening, opening_lines
+from bumblebee.report.sections.policy_sections import registry_section, success_section, training_section
+from bumblebee.report.sections.round_sections import round_section
 from bumblebee.report.wording import plural
-from tasks import paths
-from tasks.film import film_blocks
-from tasks.lineage import git_sha
-from tasks.replays import replays
-from tasks.rollouts_config import RolloutsConfig
+from tasks.pages.film import film_blocks
+from tasks.pages.replays import replays
+from tasks.running import paths
+from tasks.running.lineage import git_sha
+from tasks.running.stage import load, log_run, output_file, run_stage
 from tasks.sections import Loop, Round, loop
-from tasks.stage import load, log_run, output_file, run_stage
+from tasks.settings.rollouts_config import RolloutsConfig
 
 
 @dataclass(frozen=True)

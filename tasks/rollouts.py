@@ -12,24 +12,24 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bumblebee.deploy.episodes import Episode, run_episodes
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.robots import NominalRobots
-from bumblebee.deploy.sensors import NO_NOISE
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.measured.rollout import copy_of_cluster
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
+from bumblebee.policy.episodes import Episode, run_episodes
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.robots import NominalRobots
 from bumblebee.robot.model import write_xml
+from bumblebee.robot.sensors import NO_NOISE
 from bumblebee.tracking.terminations import success_threshold
-from tasks import paths
-from tasks.rollouts_config import RolloutsConfig
+from tasks.on_robot.stand_in import DIRECT, cut, start_stand_in
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_folder, run_stage
 from tasks.sections import parent_of
-from tasks.stage import load, log_run, output_folder, run_stage
-from tasks.stand_in import DIRECT, cut, start_stand_in
+from tasks.settings.rollouts_config import RolloutsConfig
 
-OVER_WIRE = ["-m", "bumblebee.wire.stand_in"]
+OVER_WIRE = ["-m", "bumblebee.wire.robot_end.stand_in"]
 """Process of the robot behind guard and wire."""
 
 

@@ -14,20 +14,20 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from bumblebee.deploy.stand_in_effects import SCHEMA, declared_g1, entry, seal
-from bumblebee.deploy.undeclared.faults import largest, peaks
-from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits
 from bumblebee.evaluation.thinning import thin
 from bumblebee.learning.export import export_shipped
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
 from bumblebee.robot.facts import g1_bodies, joint_names
-from tasks import paths
-from tasks.rollouts_config import RolloutsConfig
-from tasks.seal_trial import Trial, followed, try_robot
-from tasks.stage import load, log_run, output_file, run_stage
-from tasks.stand_in import cut
+from bumblebee.stand_in.sealed import SCHEMA, declared_g1, entry, seal
+from bumblebee.stand_in.undeclared.faults import largest, peaks
+from bumblebee.stand_in.undeclared.kinds import KINDS, Kind, Place, fits
+from tasks.on_robot.seal_trial import Trial, followed, try_robot
+from tasks.on_robot.stand_in import cut
+from tasks.running import paths
+from tasks.running.stage import load, log_run, output_file, run_stage
+from tasks.settings.rollouts_config import RolloutsConfig
 
 WORSE = 1.1  # sizes of a draw over those of the draw before
 SMALLEST = 0.4  # share of a kind's largest size that every size has, before `severity`

@@ -10,7 +10,8 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
 from bumblebee.last_line import guarded
 from bumblebee.ranges import Few, Name, Range, Ranged, Size, shown
-from tasks import params, paths
+from tasks.running import paths
+from tasks.settings import params
 
 CHECKED = paths.SCRATCH / "params.checked"
 LONGEST = 64  # signs of a cluster's name, which names folders and models
@@ -90,7 +91,7 @@ def check_content(content: dict[str, Any], path: Path) -> dict[str, Any]:
     for section, place in params.SECTIONS.items():
         module, _, name = place.partition(":")
         found[section] = params.section_of(content, section, getattr(import_module(module), name), path)
-    import_module("tasks.sources").check_sources(found, path)
+    import_module("tasks.settings.sources").check_sources(found, path)
     return found
 
 

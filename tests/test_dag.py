@@ -3,14 +3,10 @@
 Renew with: python -m tests.test_dag
 """
 
-from collections.abc import Iterable
-from functools import cache
 from pathlib import Path
 
-import yaml
-
 from flows.stages import read_stages
-from tests.import_graph import Graph, call_graph, modules, reached
+from tests.stage_code import NO_RESULT, NO_RESULT_OF, called_files, covered, described
 
 HOME = Path(__file__).parent.parent
 SNAPSHOT = Path(__file__).parent / "dag.txt"
@@ -46,108 +42,6 @@ def test_the_sealed_effects_are_read_by_the_stand_in_and_the_report_only():
     assert readers == {"rollouts", "evaluate", "report"}
 
 
-# What stages call and need not depend on, by the beginning of its path, each with the reason why its change may leave
-# their outputs as they are.
-NO_RESULT = {
-    "bumblebee/errors.py": "how a refusal reads",
-    "bumblebee/last_line.py": "how a command ends",
-    "bumblebee/progress.py": "bars on the terminal",
-    "bumblebee/files.py": "writes whole or not at all",
-    "bumblebee/io/": "reads within limits and writes whole: it refuses or passes, and changes no value",
-    "bumblebee/ranges.py": "refuses settings; those that pass are among the parameters",
-    "bumblebee/learning/checkpoint.py": "what a killed training goes on from",
-    "bumblebee/learning/gpu_memory.py": "refuses a GPU that is too small, or passes",
-    "bumblebee/learning/curve.py": "the learning curve, to be looked at",
-    "bumblebee/measured/metadata.py": "reads and writes files of rollouts: it refuses or passes",
-    "bumblebee/measured/tables.py": "the same",
-    "bumblebee/measured/csv_faults.py": "how a refusal reads",
-    **{
-        f"bumblebee/motion/{name}.py": "reads and writes the library of clips: it refuses or passes"
-        for name in ("captions", "checks", "clip_facts", "parquet", "raw", "texts")
-    },
-    "bumblebee/motion/store/": "the same",
-    "tasks/stage.py": "starts a stage and stores what it made",
-    "tasks/paths.py": "where that lies; dvc.yaml says it too",
-    "tasks/params.py": "reads parameters; what they are is a dependency of its own",
-    "tasks/sections.py": "the same",
-    "tasks/parent.py": "ends with the process that started it",
-    "tasks/recorder.py": "what MLflow is told",
-    "bumblebee/measured/gate_record.py": "a copy of what was answered, which no stage reads",
-    "tasks/registry/": "what MLflow is told",
-    "tasks/outputs.py": "what MLflow is told",
-    "tasks/database.py": "keeps what MLflow is told",
-    "tasks/private.py": "who may look at what DVC keeps",
-    "tasks/lab.py": "where that is kept",
-    "tasks/lab_checks.py": "the same",
-    "tasks/lab_serve.py": "the same",
-    "tasks/run_form.py": "the same",
-    "tasks/lineage.py": "the same",
-    "tasks/lock_file.py": "the same",
-}
-_PAGE = "draws the page for people, which no later stage reads"
-_NETWORK = "of learning/ppo.py it takes the algorithm; the task of policies and their motions are not its own"
-_CONTRACT = "of an exported policy it reads the contract and the hash, of which this is no part"
-_DRAWN = ("example_windows", "gain_by_horizon", "headline", "html", "left_table", "page", "svg", "terminal")
-NO_RESULT_OF = {
-    "ingest": {
-        **{f"bumblebee/measured/{name}.py": _PAGE for name in ("gate_words", "overview", "overview_plots")},
-        **{
-            f"bumblebee/measured/{name}.py": "who answers, and how; the request is not its result"
-            for name in ("gate_people", "gate_table")
-        },
-    },
-    "diagnose": {
-        **{
-            f"bumblebee/diagnosis/report/{name}.py": _PAGE
-            # html also rounds the numbers in notes
-            for name in _DRAWN
-        },
-        "bumblebee/report/": _PAGE,
-        "bumblebee/diagnosis/gap/": "another command writes it",
-        "bumblebee/diagnosis/places.py": "refuses a folder that is in use",
-    },
-    "report": {"bumblebee/diagnosis/report/": "the diagnosis' own page"},
-    "compensate": {"bumblebee/measured/model_file.py": "loads a user's model; the loop's is the G1"},
-    "delta": {
-        path: _NETWORK
-        for path in (
-            "bumblebee/tracking/",
-            "bumblebee/motion/",
-            "bumblebee/learning/learner.py",
-            "bumblebee/learning/policy.py",
-            "bumblebee/learning/ranks.py",
-        )
-    },
-    "publish": {
-        f"bumblebee/{room}": _CONTRACT
-        for room in ("effects/", "motion/", "quaternions.py", "robot/", "sim/", "tracking/")
-    },
-}
-
-
-def described() -> dict[str, dict[str, list[str]]]:
-    """The stages of dvc.yaml as they stand there."""
-    return yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
-
-
-@cache
-def called_files(stage: str) -> frozenset[str]:
-    """The files of the stage's module and of all that it calls."""
-    start, known = f"tasks.{stage}", modules(HOME)
-    return frozenset(str(known[name].relative_to(HOME)) for name in {start} | reached(calls(), start))
-
-
-@cache
-def calls() -> Graph:
-    """Who calls whom; read once."""
-    return call_graph(HOME)
-
-
-def covered(path: str, deps: Iterable[str]) -> bool:
-    """Whether a file is one of the dependencies or lies in one."""
-    return any(path == dep or path.startswith(f"{dep}/") for dep in deps)
-
-
 def test_a_stage_depends_on_all_code_that_it_calls():
     """However far away: a change there makes it stale, or it is said above why not."""
     missing = []
@@ -156,7 +50,7 @@ def test_a_stage_depends_on_all_code_that_it_calls():
         called = {path for path in called_files(name) if not path.endswith("__init__.py")}  # faces pass names on
         wanting = (path for path in called if not path.startswith(spared))
         missing += [f"{name}: {path}" for path in sorted(wanting) if not covered(path, stage["deps"])]
-    assert missing == []
+    assert missing == [], "python -m tests.stage_code writes what is missing"
 
 
 def test_a_stage_depends_on_no_code_that_it_does_not_call():

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from bumblebee.sim.effects import CATALOGUE
-from tasks.policy_filter import PolicyFilter
+from tasks.policies.policy_filter import PolicyFilter
 
 HOME = Path(__file__).parent.parent
 DOCS = HOME / "docs"

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from bumblebee.tracking import rewards
-from tasks import paths
+from tasks.running import paths
 
 HOME = Path(__file__).parent.parent
 STAGES = yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
@@ -48,7 +48,7 @@ def test_a_stage_depends_on_the_sections_that_its_module_loads(stage: str):
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_stage_names_the_paths_that_its_module_uses(stage: str):
-    """Paths that are constants in tasks/paths.py; those of rounds and clusters are spelled in dvc.yaml alone."""
+    """Paths that are constants in running/paths.py; those of rounds and clusters are spelled in dvc.yaml alone."""
     entry = STAGES[stage]
     named = [path if isinstance(path, str) else next(iter(path)) for path in (*entry["deps"], *entry["outs"])]
     for name in sorted(set(re.findall(r"\bpaths\.([A-Z][A-Z_]*)\b", source(stage)))):
@@ -57,7 +57,7 @@ def test_a_stage_names_the_paths_that_its_module_uses(stage: str):
             continue
         spared = any(who == stage and str(path).startswith(place) for who, place in READ_OTHERWISE)
         known = any(f"{path}/".startswith(f"{one}/") or one.startswith(f"{path}/") for one in named)
-        assert spared or known, f"dvc.yaml, stage {stage}: add {path} (tasks/paths.py: {name}) to deps or outs"
+        assert spared or known, f"dvc.yaml, stage {stage}: add {path} (tasks/running/paths.py: {name}) to deps or outs"
 
 
 @pytest.mark.parametrize("stage", STAGES)

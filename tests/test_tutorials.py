@@ -13,8 +13,8 @@ import typer
 
 from bumblebee import cli
 from bumblebee.measured import gate
-from flows import gate_answer
-from tests.flows.test_gate_answer import waiting
+from flows.gates import gate_answer
+from tests.flows.gates.test_gate_answer import waiting
 from tests.motion.human.people import bvh
 
 DOCS = Path(__file__).parent.parent / "docs"

@@ -80,10 +80,10 @@ def _child(seeds: Sequence[int], quick: bool) -> int:
     import mujoco
 
     from benchmarks.any_robot_logs.case import FULL, QUICK, run_case
-    from bumblebee.diagnosis.simulation import simulate
+    from bumblebee.diagnosis.simulation import batches
 
     mujoco.set_mju_user_warning(lambda text: None)
-    simulate.THREADS = 1
+    batches.THREADS = 1
     for seed in seeds:
         print(json.dumps(run_case(seed, QUICK if quick else FULL)), flush=True)
     return 0

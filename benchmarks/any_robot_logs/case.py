@@ -24,7 +24,7 @@ from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, TimeSteps
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout, write_rollout
-from bumblebee.report.windows import windows_inlay
+from bumblebee.report.replays.windows import windows_inlay
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
     python -m benchmarks.baselines --method omnih2o --motions motions.npz --minutes 20 --out results/omnih2o
 
 `ours` is the task of this repository (`bumblebee.tracking`), `paper` the BumbleBee paper's teacher and student without
-clusters, experts and delta actions (its "General Init"), the others are those of `bumblebee.baselines`. All learn from
+clusters, experts and delta actions (its "General Init"), the others are those of `others/`. All learn from
 the same motions for the same time on the same engine; a method with a student gives it 30 % of that time. The
 curriculum follows the time. `--call-minutes` ends a run early; the same command goes on from `resume.pt` in the output
 folder, with new episodes. `--set env.threshold_end=0.3 ppo.entropy=0.003` changes single settings. `--variety 2` adds
@@ -21,27 +21,27 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from benchmarks.baselines.calls import Clock, keep_actor, resume, save, tell
 from benchmarks.baselines.methods import METHODS, RANDOMISATIONS, Method, changed, method, require_kept
+from benchmarks.baselines.others.dagger import Distiller
+from benchmarks.baselines.others.env import BaselineEnv
+from benchmarks.baselines.others.library import MovingLibrary
 from benchmarks.baselines.trial import Tried, report
 from benchmarks.baselines.variety import shares, varied
 from benchmarks.motion_pack import Packed, read_pack, whole_motions
-from bumblebee.baselines.dagger import Distiller
-from bumblebee.baselines.env import BaselineEnv
-from bumblebee.baselines.library import MovingLibrary
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
-from bumblebee.files import save_tensors
-from bumblebee.learning.distill import DistillConfig, distill
-from bumblebee.learning.learner import CURVE, Learner
+from bumblebee.learning.generalist.distill import DistillConfig, distill
+from bumblebee.learning.learner import CURVE
 from bumblebee.learning.policy import Policy, load_policy
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.pieces import motion_of
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.sampler import ClipShares
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.sampling.sampler import ClipShares
 
 STUDENT_SHARE = 0.3
 RESUME, STUDENT_FOLDER, SETTINGS = "resume.pt", "student", "settings.json"
@@ -77,31 +77,6 @@ def grouped(factors: Tensor, clips: list[Clip]) -> ClipShares:
     return ClipShares(group, values * frames)
 
 
-class Clock:
-    """When to stop: the call's end, and lines now and then.
-
-    Args:
-        minutes: how long this call may train; None for as long as it takes.
-    """
-
-    def __init__(self, minutes: float | None) -> None:
-        self.began = time.monotonic()
-        self.limit = None if minutes is None else 60 * minutes
-        self._marks = {"tell": self.began, "save": self.began}
-
-    @property
-    def over(self) -> bool:
-        """Whether the call's time is up."""
-        return self.limit is not None and time.monotonic() - self.began > self.limit
-
-    def due(self, what: str, every: float) -> bool:
-        """Whether so many seconds have gone by since this was last due."""
-        if time.monotonic() - self._marks[what] < every:
-            return False
-        self._marks[what] = time.monotonic()
-        return True
-
-
 def train_teacher(
     own: Method, rows: list[Packed], options: argparse.Namespace, clock: Clock, minutes: float
 ) -> Trainer:
@@ -113,7 +88,7 @@ def train_teacher(
     config = replace(own.ppo, iterations=_ENDLESS, checkpoint_every=_ENDLESS)
     trainer = Trainer(env, config, options.out, options.seed, options.parent)
     if (options.out / RESUME).exists():
-        _resume(trainer, options.out / RESUME)
+        resume(trainer, options.out / RESUME)
     elif options.std:
         trainer.algorithm.actor.distribution.std_param.data.fill_(options.std)
 
@@ -122,65 +97,16 @@ def train_teacher(
             each = trainer._seconds / trainer.iteration
             trainer.config = replace(trainer.config, iterations=max(round(60 * minutes / each), trainer.iteration + 1))
         if clock.due("tell", _TELL_EVERY):
-            _tell(options.out / CURVE)
+            tell(options.out / CURVE)
         if clock.due("save", _SAVE_EVERY):
-            _save(trainer, options.out / RESUME)
+            save(trainer, options.out / RESUME)
         keep_actor(trainer, options.out, options.keep_every)
         return trainer._seconds >= 60 * minutes or clock.over
 
     if trainer._seconds < 60 * minutes:
         trainer.train(own.name, enough)
-    _save(trainer, options.out / RESUME)
+    save(trainer, options.out / RESUME)
     return trainer
-
-
-def keep_actor(trainer: Learner, out: Path, every: float) -> None:
-    """Keep the actor as it is after each `every` seconds of training, as `at-<seconds>s` in `out`; 0: never."""
-    if every and (mark := trainer._seconds // every):
-        folder = out / f"at-{mark * every:g}s"
-        if not folder.exists():
-            folder.mkdir()
-            policy = trainer.policy()
-            Policy(policy.actor, {}, policy.shape).save(folder)
-
-
-def _save(trainer: Trainer, path: Path) -> None:
-    env = trainer.env
-    score = env.score.kept() if isinstance(env, BaselineEnv) else {}
-    content = {
-        "algorithm": trainer.algorithm.save(),
-        "learning_rate": trainer.algorithm.learning_rate,
-        "iteration": trainer.iteration,
-        "seconds": trainer._seconds,
-        "failure": env.sampler.failure.cpu(),
-        "score": {name: score[name].cpu() for name in ("factor", "mean_length") if score},
-    }
-    save_tensors(path, content)
-
-
-def _resume(trainer: Trainer, path: Path) -> None:
-    content = torch.load(path, weights_only=True, map_location="cpu")
-    trainer.algorithm.load(content["algorithm"], None, True)
-    trainer.algorithm.learning_rate = content["learning_rate"]
-    trainer.iteration, trainer._seconds = content["iteration"], content["seconds"]
-    trainer.env.sampler.failure.copy_(content["failure"])
-    if isinstance(trainer.env, BaselineEnv):
-        for name, value in content["score"].items():
-            trainer.env.score.kept()[name].copy_(value)
-    print(f"goes on after {trainer.iteration} iterations, {trainer._seconds / 60:.1f} min", flush=True)
-
-
-def _tell(curve: Path) -> None:
-    if curve.exists():
-        lines = curve.read_text().splitlines()
-        names, values = lines[0].split(","), lines[-1].split(",")
-        row = dict(zip(names, values, strict=False))
-        wanted = ("frames", "seconds", "reward", "success", "key_error", "episode_length", "unstable", "action_std")
-        wanted += ("loss_model", "imagined", "alive")
-        print(
-            "  ".join(f"{name} {row[name]}" for name in (*wanted, "learning_rate", "threshold") if name in row),
-            flush=True,
-        )
 
 
 def train_student(
@@ -195,7 +121,7 @@ def train_student(
 
     def enough() -> bool:
         if clock.due("tell", _TELL_EVERY):
-            _tell(options.out / STUDENT_FOLDER / "student.csv")
+            tell(options.out / STUDENT_FOLDER / "student.csv")
         return distiller.seconds >= seconds or clock.over
 
     distiller.train(enough)

@@ -7,12 +7,12 @@ from typing import Any
 
 import yaml
 
-from bumblebee.baselines.registry import BASELINES, baseline
-from bumblebee.baselines.spec import Baseline, StudentConfig
-from bumblebee.baselines.trial import Manner
+from benchmarks.baselines.others.registry import BASELINES, baseline
+from benchmarks.baselines.others.spec import Baseline, StudentConfig
 from bumblebee.errors import BadInput
 from bumblebee.learning.config import PAPER, PpoConfig
-from bumblebee.learning.distill import PAPER_DAGGER, DistillConfig
+from bumblebee.learning.generalist.distill import PAPER_DAGGER, DistillConfig
+from bumblebee.learning.rollout import Manner
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK, STUDENT
 

@@ -20,17 +20,18 @@ import pandas as pd
 import torch
 
 from benchmarks.baselines.methods import RANDOMISATIONS
+from benchmarks.baselines.others.follow import follow
 from benchmarks.baselines.trial import PHYSICS_HZ, rate
 from benchmarks.baselines.variety import another, at_tempo, flies, with_arms
 from benchmarks.motion_pack import read_pack, whole_motions
-from bumblebee.baselines.trial import Manner, follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.intervals import success_rate
 from bumblebee.learning.policy import load_policy
+from bumblebee.learning.rollout import Manner
 from bumblebee.motion.clip import Clip
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.reflection import reflected
+from bumblebee.tracking.sampling.reflection import reflected
 
 FASTER = 1.1
 

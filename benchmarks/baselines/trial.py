@@ -15,11 +15,12 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from benchmarks.baselines.others.follow import follow
 from benchmarks.motion_pack import read_pack, whole_motions
-from bumblebee.baselines.trial import Manner, follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.intervals import mean_by_motion, success_rate
 from bumblebee.learning.policy import load_policy
+from bumblebee.learning.rollout import Manner
 from bumblebee.sim.sensors import load_model
 
 PHYSICS_HZ = 200.0

@@ -14,10 +14,10 @@ import numpy as np
 from benchmarks.from_a_drawing.case import MORE, Case
 from benchmarks.undeclared.excite import make_plan
 from benchmarks.undeclared.flight import fly, rollouts
-from bumblebee.deploy.undeclared.declared import describe
-from bumblebee.deploy.undeclared.signals import CommandDelay
 from bumblebee.diagnosis.dataset import make_session
 from bumblebee.robot.model import build_spec
+from bumblebee.stand_in.undeclared.declared import describe
+from bumblebee.stand_in.undeclared.signals import CommandDelay
 
 ROBOTS = ("stand", "track")
 _COUNT, _SECONDS = 8, 6.0

@@ -22,9 +22,9 @@ WORDS = {
     "flow": ("flows.walk",),
     "dvc": ("flows.reproduce", "{name}"),
     "stage": ("tasks.{stage}",),
-    "recorder": ("tasks.recorder",),
-    "prefect": ("flows.front", "prefect"),
-    "mlflow": ("flows.front", "mlflow"),
+    "recorder": ("tasks.running.recorder",),
+    "prefect": ("flows.servers.front", "prefect"),
+    "mlflow": ("flows.servers.front", "mlflow"),
 }
 ENDED = ("keeper", "flow", "dvc", "stage")  # with which the run ends
 SERVERS = ("prefect", "mlflow")  # without which it goes on: hit during its last stage

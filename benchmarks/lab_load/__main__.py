@@ -23,10 +23,10 @@ import yaml
 from benchmarks.lab_load import fill, plain
 from benchmarks.lab_load.table import table
 from benchmarks.lab_load.users import Arm, Known, Sample, drive, seen
-from flows import login
 from flows.attend import ended_in_order
 from flows.environment import SERVERS
-from flows.servers import servers
+from flows.people import login
+from flows.servers.servers import servers
 from tests.lab import machines
 
 

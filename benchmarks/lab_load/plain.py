@@ -11,7 +11,7 @@ from pathlib import Path
 
 from flows.environment import environment
 from flows.processes import end_tree
-from tasks.lab import read_lab
+from tasks.lab.servers import read_lab
 from tests.lab.machines import HOST, free_port
 
 START = 180.0  # [s]

@@ -12,8 +12,8 @@ from urllib.parse import urlsplit
 import sqlalchemy
 import yaml
 
-from tasks.lab import Lab, read_lab
-from tasks.lab_checks import s3_client
+from tasks.lab.checks import s3_client
+from tasks.lab.servers import Lab, read_lab
 
 TIMES = {"seconds", "frames_per_second"}  # of a policy's card and curve
 HISTORY = {"version", "versions", "champion", "promoted", "reason"}  # of published.json: what was there before

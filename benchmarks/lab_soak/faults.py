@@ -36,8 +36,8 @@ LASTS = {
 PROCESSES = {
     "keeper killed": ("flows.demo",),
     "flow killed": ("flows.walk",),
-    "Prefect's server killed": ("flows.front", "prefect"),
-    "MLflow's server killed": ("flows.front", "mlflow"),
+    "Prefect's server killed": ("flows.servers.front", "prefect"),
+    "MLflow's server killed": ("flows.servers.front", "mlflow"),
 }
 PATIENCE = 90.0  # [s] that a fault waits for the process that it hits
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from benchmarks.lab_soak import facts, faults, loops
 from benchmarks.lab_soak.record import Record, read
 from benchmarks.lab_soak.stand import WORKERS, Stand, clear, stand
-from tasks.lab import read_lab
-from tasks.lineage import git_sha
+from tasks.lab.servers import read_lab
+from tasks.running.lineage import git_sha
 
 LATE = 600.0  # [s] after the last fault that the loop at work has to end
 

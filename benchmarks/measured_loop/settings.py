@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, field
 
-from bumblebee.deploy.stand_in import BASES
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.learning.policy import Policy
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.residual import ResidualConfig
+from bumblebee.stand_in.process import BASES
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from tasks.seal import SealConfig
 

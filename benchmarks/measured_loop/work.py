@@ -12,7 +12,6 @@ from torch import nn
 from benchmarks.measured_loop.settings import ARMS, Loop, seen_by
 from benchmarks.study.correction import DECLARED, Correction
 from benchmarks.study.on_robot import KEY, exported, judged_rows, run_on_robot, write_csv
-from bumblebee.deploy.episodes import Episode
 from bumblebee.diagnosis.dataset import open_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
@@ -29,14 +28,15 @@ from bumblebee.learning.world_model.residual import corrected, fit_residual, new
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files, write_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import make_library
+from bumblebee.policy.episodes import Episode
 from bumblebee.robot.model import write_xml
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
+from bumblebee.tracking.sampling.library import MotionLibrary
+from tasks.on_robot.stand_in import cut
 from tasks.seal import found
-from tasks.stand_in import cut
 
 SETS = ("learn", "learn", "learn", "stop", "judge", "judge")
 """Use of the recordings of each six motions in a row."""

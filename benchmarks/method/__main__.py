@@ -13,10 +13,10 @@ from benchmarks.method.settings import NAMED, Method
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.settings import freeze
 from benchmarks.study.steps import Places, Runner, Step
-from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.errors import BadInput
 from bumblebee.io.write import write_file
 from bumblebee.last_line import guarded
+from bumblebee.stand_in.sealed import read_sealed
 
 LATER = "the call is over: the same command goes on"
 

@@ -14,7 +14,6 @@ from benchmarks.study.correction import DECLARED, Correction
 from benchmarks.study.delta_training import replayed, write_delta
 from benchmarks.study.motions import Motions
 from benchmarks.study.on_robot import exported, read_recordings, run_policies_on_robot, write_csv
-from bumblebee.deploy.episodes import Episode
 from bumblebee.diagnosis.dataset import open_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
@@ -23,9 +22,10 @@ from bumblebee.evaluation.thinning import thin
 from bumblebee.io.write import new_folder
 from bumblebee.learning.delta import stack
 from bumblebee.measured.rollout import Rollout, write_rollout
+from bumblebee.policy.episodes import Episode
 from bumblebee.robot.model import write_xml
 from bumblebee.sim.sensors import load_model
-from tasks.stand_in import cut
+from tasks.on_robot.stand_in import cut
 
 
 def recorded_motions(motions: Motions, most: int) -> dict[str, list[str]]:

@@ -7,8 +7,8 @@ from pathlib import Path
 from benchmarks.method.settings import Method
 from bumblebee.errors import BadInput
 from bumblebee.io.write import write_file
-from tasks.lineage import path_hash
 from tasks.registry import log_run
+from tasks.running.lineage import path_hash
 
 PATTERNS = (
     "study.json",

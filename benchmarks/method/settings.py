@@ -4,12 +4,12 @@ from dataclasses import dataclass, field, replace
 
 from benchmarks.baselines.methods import OURS
 from benchmarks.study.settings import Distilling
-from bumblebee.deploy.stand_in import BASES
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.delta import DeltaConfig, RegressionConfig
 from bumblebee.learning.learners import Config
 from bumblebee.learning.world_model.config import WorldModelConfig
+from bumblebee.stand_in.process import BASES
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.presets import PAPER_RANDOMISATION
 

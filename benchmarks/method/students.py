@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from benchmarks.method.places import OWN, student
 from benchmarks.method.settings import Method
-from bumblebee.learning.distill import DistillConfig
+from bumblebee.learning.generalist.distill import DistillConfig
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
 from bumblebee.tracking.presets import STUDENT
 

@@ -12,7 +12,7 @@ from benchmarks.method.places import ARMS, BASE, GENERAL, LONGER, ONE, OWN, RAND
 from benchmarks.method.settings import Method
 from benchmarks.method.students import AHEAD, changed, compared
 from benchmarks.study.motions import Motions
-from benchmarks.study.tables import (
+from benchmarks.study.pages.tables import (
     RATES,
     SPLITS,
     cell,
@@ -25,8 +25,8 @@ from benchmarks.study.tables import (
     relative,
     signed,
 )
-from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.learning.delta import compare
+from bumblebee.stand_in.sealed import read_sealed
 
 ROWS = {
     "base": "base policy",

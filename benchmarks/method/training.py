@@ -14,8 +14,8 @@ from benchmarks.study.correction import DECLARED, Correction
 from benchmarks.study.motions import Motions
 from bumblebee.io.write import write_file
 from bumblebee.learning.delta import of_clusters
-from bumblebee.learning.distill import CHECKPOINT as DISTILLING
-from bumblebee.learning.distill import Distiller
+from bumblebee.learning.generalist.distill import CHECKPOINT as DISTILLING
+from bumblebee.learning.generalist.distill import Distiller
 from bumblebee.learning.learner import CHECKPOINT, Learner
 from bumblebee.learning.learners import Config, make_learner, played
 from bumblebee.learning.policy import load_policy
@@ -26,9 +26,9 @@ from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.sampler import ClipShares
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.sampling.sampler import ClipShares
 
 CHECKPOINT_EVERY = 60
 """Iterations."""

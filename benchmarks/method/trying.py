@@ -9,6 +9,7 @@ import pandas as pd
 import torch
 from torch import Tensor
 
+from benchmarks.baselines.others.follow import follow
 from benchmarks.method.places import RANDOM, experts
 from benchmarks.method.settings import Method
 from benchmarks.method.students import is_student
@@ -16,10 +17,10 @@ from benchmarks.study.motions import Motions
 from benchmarks.study.on_robot import write_csv
 from benchmarks.study.robots import RobotsConfig
 from benchmarks.study.sealed_trials import chosen_clips, follow_sealed
-from bumblebee.baselines.trial import Manner, follow
-from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.rollout import Manner
 from bumblebee.motion.clip import Clip
+from bumblebee.stand_in.sealed import read_sealed
 from bumblebee.tracking.config import Randomisation
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.presets import PAPER_RANDOMISATION

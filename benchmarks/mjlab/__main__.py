@@ -26,15 +26,15 @@ from benchmarks.baselines.__main__ import main
 from benchmarks.baselines.trial import PHYSICS_HZ
 from benchmarks.mjlab.record import FOLLOWED, write_followed
 from benchmarks.motion_pack import FPS, read_pack, whole_motions, write_pack
-from bumblebee.baselines.trial import upright
 from bumblebee.errors import BadInput
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.rollout import Manner, roll_out
+from bumblebee.learning.three_rules import upright
 from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import joint_names
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 
 FIVE = ("walk_level1", "step_forward_forward_level1", "squat_level1", "jump_forward_level1", "kick_level1")
 """The first motion of each of five families of ASAP's."""

@@ -14,13 +14,13 @@ from benchmarks.undeclared.excite import HZ
 from benchmarks.undeclared.flight import Flight, fly, rollouts
 from benchmarks.undeclared.lottery import Case as Wanted
 from benchmarks.undeclared.robots import declared
-from bumblebee.deploy.undeclared.declared import Declared, describe
-from bumblebee.deploy.undeclared.kinds import CATALOGUE, fits
-from bumblebee.deploy.undeclared.law import Law
 from bumblebee.diagnosis.dataset import Session, make_session
 from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
 from bumblebee.diagnosis.plan import Gain, Motion, Plan, PlanConfig, findings_of, make_plan, safe_pool, set_stage
 from bumblebee.measured.rollout import Rollout
+from bumblebee.stand_in.undeclared.declared import Declared, describe
+from bumblebee.stand_in.undeclared.kinds import CATALOGUE, fits
+from bumblebee.stand_in.undeclared.law import Law
 
 VERSION = 1
 POOR = ("slow", "posture", "one")  # slow motions; small ones about one posture; one joint at a time

@@ -1,7 +1,7 @@
 """Motions of people on any humanoid, measured: `python -m benchmarks.retarget.any_robot PEOPLE --model M --mapping Y`.
 
-`bumblebee.motion.quality` knows the G1 and its table of facts. Here the same measures are made of a robot's tree, the
-corners of its soles and its capsules, so that robots can be compared.
+`bumblebee.motion.filters.quality` knows the G1 and its table of facts. Here they are made of a tree,
+the corners of its soles and its capsules, so that robots can be compared.
 """
 
 import argparse
@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.retarget.table import markdown, summary
+from bumblebee.motion.filters.quality import TOLERANCE, TOUCHES, at_times
 from bumblebee.motion.human.motion import HumanMotion
-from bumblebee.motion.listing import find_motions
-from bumblebee.motion.quality import TOLERANCE, TOUCHES, at_times
+from bumblebee.motion.reading.listing import find_motions
 from bumblebee.motion.retarget.collision import depths, obstacles, shape_heights
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.mapping import CORNERS, Robot, g1, read_robot
@@ -25,7 +25,7 @@ from bumblebee.motion.stance import human_contacts
 
 
 def measures(robot: Robot, at: Trajectory, fps: float, human: np.ndarray) -> dict[str, float]:
-    """How good a trajectory is, in the units and by the rules of `bumblebee.motion.quality`.
+    """How good a trajectory is, in the units and by the rules of `bumblebee.motion.filters.quality`.
 
     Args:
         robot: with its tree and soles.

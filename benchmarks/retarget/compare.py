@@ -18,12 +18,12 @@ import numpy as np
 from benchmarks.retarget.landmarks import person_of, robot_landmarks, scaled
 from benchmarks.retarget.table import markdown, summary
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.convert import clip_of
+from bumblebee.motion.filters.quality import at_times, joint_error, keypoint_error, quality
+from bumblebee.motion.formats.convert import clip_of
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
-from bumblebee.motion.listing import find_motions
-from bumblebee.motion.quality import at_times, joint_error, keypoint_error, quality
 from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.reading.listing import find_motions
 from bumblebee.motion.resample import resample
 from bumblebee.progress import progress
 

@@ -12,12 +12,12 @@ from PIL import Image, ImageDraw, ImageFont
 from benchmarks.retarget.compare import FPS
 from benchmarks.retarget.landmarks import scaled
 from bumblebee.errors import BadInput
-from bumblebee.motion.convert import clip_of
+from bumblebee.motion.filters.quality import at_times
+from bumblebee.motion.formats.convert import clip_of
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
-from bumblebee.motion.listing import find_motions
-from bumblebee.motion.quality import at_times
+from bumblebee.motion.reading.listing import find_motions
 from bumblebee.motion.retarget.retarget import retarget
-from bumblebee.report.playback import pictures
+from bumblebee.report.films.playback import pictures
 
 _CHAINS = (
     ("pelvis", "left_hip", "left_knee", "left_ankle", "left_toe"),

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from benchmarks.retarget.table import markdown, summary
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.folder import ReadConfig, read_folder
+from bumblebee.motion.filters.quality import quality
 from bumblebee.motion.grounding import GroundingConfig, Method
-from bumblebee.motion.quality import quality
+from bumblebee.motion.reading.folder import ReadConfig, read_folder
 from bumblebee.progress import progress
 
 METHODS: dict[str, Method] = {":raw": "off", ":lower": "lower"}

@@ -8,10 +8,10 @@ from pathlib import Path
 import torch
 
 import benchmarks.study
-from benchmarks.study.curves import draw
-from benchmarks.study.generalist_tables import generalist_tables
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, prepare, read_motions
+from benchmarks.study.pages.curves import draw
+from benchmarks.study.pages.generalist_tables import generalist_tables
 from benchmarks.study.parts import PARTS
 from benchmarks.study.settings import SMALL, Study, freeze
 from benchmarks.study.steps import Places, Runner, Step

@@ -8,7 +8,7 @@ import mujoco
 from bumblebee.learning.delta import action_adapter, load_delta
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.tracking.env import ActionAdapter
-from bumblebee.tracking.observations import action_scale
+from bumblebee.tracking.observing.observations import action_scale
 
 
 @dataclass(frozen=True)

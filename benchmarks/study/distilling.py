@@ -11,9 +11,9 @@ from benchmarks.study.motions import Motions
 from benchmarks.study.others import distil_other
 from benchmarks.study.settings import Study
 from benchmarks.study.settings import settings_of as trained_with
-from bumblebee.learning.distill import CHECKPOINT
+from bumblebee.learning.generalist.distill import CHECKPOINT
+from bumblebee.learning.generalist.teacher_student import generalist_of
 from bumblebee.learning.policy import load_policy
-from bumblebee.learning.teacher_student import generalist_of
 from bumblebee.progress import progress
 
 CURVE = "distill.csv"

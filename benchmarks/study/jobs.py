@@ -138,7 +138,7 @@ MORE_GENERALISTS = {
 }
 """Further ones of the part `table-1`, as `transformer` is but for whom they learn from; all have equal steps."""
 OTHERS = {"omnih2o": "OmniH2O", "exbody2": "Exbody2", "hover": "HOVER"}
-"""Other groups' methods of the part `table-1`, by their names in `bumblebee.baselines.registry`."""
+"""Other groups' methods of the part `table-1`, by their names in `benchmarks.baselines.others.registry`."""
 
 
 def generalist_jobs(study: Study, motions: Motions) -> list[Job]:

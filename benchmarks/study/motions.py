@@ -13,9 +13,9 @@ from bumblebee.clustering.config import ClusterConfig
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import DescribeConfig
-from bumblebee.motion.filter import filter_clips
-from bumblebee.motion.folder import ReadConfig, read_folder
+from bumblebee.motion.filters.rules import filter_clips
 from bumblebee.motion.pieces import hold_out, motion_of
+from bumblebee.motion.reading.folder import ReadConfig, read_folder
 
 MOTIONS, LABELS = "motions.npz", "labels.csv"
 SHARE = 0.22

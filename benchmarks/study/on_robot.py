@@ -1,21 +1,21 @@
 """Runs a policy on a sealed robot, which is a process of its own."""
 
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from bumblebee.deploy.episodes import Episode
 from bumblebee.evaluation.episodes import rollout_metrics
+from bumblebee.io.whole import put
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import load_policy
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import write_library
+from bumblebee.policy.episodes import Episode
 from bumblebee.tracking.terminations import success_threshold
-from tasks.stand_in import start_stand_in
+from tasks.on_robot.stand_in import start_stand_in
 
 KEY = "policy"
 
@@ -92,7 +92,4 @@ def judged_rows(rollouts: Sequence[Rollout], clips: Sequence[Clip], held_out: Se
 
 def write_csv(path: Path, table: pd.DataFrame) -> None:
     """Write a table whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = path.with_name(f".{path.name}.part")
-    table.to_csv(fresh, index=False)
-    os.replace(fresh, path)
+    put(path, table.to_csv(index=False).encode())

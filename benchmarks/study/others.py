@@ -11,16 +11,16 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from benchmarks.baselines.others.dagger import CHECKPOINT, CURVE, Distiller
+from benchmarks.baselines.others.env import BaselineEnv
+from benchmarks.baselines.others.library import MovingLibrary
+from benchmarks.baselines.others.registry import baseline
+from benchmarks.baselines.others.spec import Baseline
 from benchmarks.study.jobs import OTHERS, Job
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
-from bumblebee.baselines.dagger import CHECKPOINT, CURVE, Distiller
-from bumblebee.baselines.env import BaselineEnv
-from bumblebee.baselines.library import MovingLibrary
-from bumblebee.baselines.registry import baseline
-from bumblebee.baselines.spec import Baseline
-from bumblebee.baselines.trial import Manner
 from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.rollout import Manner
 from bumblebee.motion.clip import Clip
 from bumblebee.progress import progress
 from bumblebee.sim.engine_choice import make_engine

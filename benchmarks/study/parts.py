@@ -4,14 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.study.generalist_tables import generalist_tables
 from benchmarks.study.jobs import Job, experts_jobs, generalist_jobs, paper_jobs, robust_jobs, table_1_jobs
 from benchmarks.study.motions import Motions
-from benchmarks.study.paper_tables import paper_tables
-from benchmarks.study.robust_tables import robust_tables
+from benchmarks.study.pages.generalist_tables import generalist_tables
+from benchmarks.study.pages.paper_tables import paper_tables
+from benchmarks.study.pages.robust_tables import robust_tables
+from benchmarks.study.pages.table_1 import table_1_tables
+from benchmarks.study.pages.tables import experts_tables
 from benchmarks.study.settings import Study
-from benchmarks.study.table_1 import table_1_tables
-from benchmarks.study.tables import experts_tables
 
 
 @dataclass(frozen=True)

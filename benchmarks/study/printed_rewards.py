@@ -19,21 +19,21 @@ from torch import Tensor
 from benchmarks.study.jobs import job_of
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.others import manner
-from benchmarks.study.tables import cell, estimate, head, line
-from bumblebee.baselines.trial import Manner
+from benchmarks.study.pages.tables import cell, estimate, head, line
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.rollout import Manner
 from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine import Engine
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig, RewardConfig
-from bumblebee.tracking.groups import Group
-from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
+from bumblebee.tracking.observing.groups import Group
+from bumblebee.tracking.observing.observations import action_middle, action_scale, joint_targets
 from bumblebee.tracking.rewards import ERRORS, Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.starts import start_state
+from bumblebee.tracking.sampling.library import MotionLibrary, ReferenceFrame
+from bumblebee.tracking.sampling.starts import start_state
 from bumblebee.tracking.terminations import fallen, success_threshold
 
 PRINTED = RewardConfig(preset="paper")

@@ -30,17 +30,17 @@ import numpy as np
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.on_robot import KEY, exported, run_on_robot
 from benchmarks.study.settings import SMALL, Study, freeze, sha256
-from bumblebee.deploy.episodes import Episode
-from bumblebee.deploy.stand_in import BASES
-from bumblebee.deploy.stand_in_effects import SCHEMA, entry, read_sealed, seal
-from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.thinning import thin
 from bumblebee.io.write import write_file
 from bumblebee.motion.clip import Clip
+from bumblebee.policy.episodes import Episode
+from bumblebee.stand_in.process import BASES
+from bumblebee.stand_in.sealed import SCHEMA, entry, read_sealed, seal
+from bumblebee.stand_in.undeclared.kinds import KINDS, Kind, Place
+from tasks.on_robot.seal_trial import episodes, to_the_end
+from tasks.on_robot.stand_in import cut
 from tasks.seal import OF_G1, SealConfig, drawn_place, size, somewhere
-from tasks.seal_trial import episodes, to_the_end
-from tasks.stand_in import cut
 
 DECLARED = "declared.json"
 GROUND = ("ground_compliance", "ground_friction")

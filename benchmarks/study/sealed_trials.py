@@ -9,7 +9,6 @@ core a policy; policies that have been tried are not tried again.
 
 import argparse
 import json
-import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -21,31 +20,32 @@ import numpy as np
 import pandas as pd
 import torch
 
+from benchmarks.baselines.others.library import MovingLibrary
 from benchmarks.study.jobs import DONE, job_of
 from benchmarks.study.motions import Motions, read_motions
+from benchmarks.study.on_robot import write_csv
 from benchmarks.study.others import manner
 from benchmarks.study.robots import DECLARED, RobotsConfig
 from benchmarks.study.trying import SEALED_TRIALS
-from bumblebee.baselines.library import MovingLibrary
-from bumblebee.baselines.trial import ThreeRules
-from bumblebee.deploy.episodes import Episode, episode_generator, start_states
-from bumblebee.deploy.odometry import placed
-from bumblebee.deploy.robots import CONTROL_HZ
-from bumblebee.deploy.runner import robot_state
-from bumblebee.deploy.sensors import SensorNoise, add_noise, draws
-from bumblebee.deploy.servo_command import ServoCommand
-from bumblebee.deploy.stand_in_effects import read_sealed
-from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.evaluation.thinning import thin
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.rollout import Manner, Tick
+from bumblebee.learning.three_rules import ThreeRules
 from bumblebee.motion.clip import Clip
-from bumblebee.tracking.groups import Group
-from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
+from bumblebee.policy.episodes import Episode, episode_generator, start_states
+from bumblebee.policy.odometry import placed
+from bumblebee.policy.robots import CONTROL_HZ
+from bumblebee.policy.runner import robot_state
+from bumblebee.robot.sensors import SensorNoise, add_noise, draws
+from bumblebee.robot.servo_command import ServoCommand
+from bumblebee.stand_in.body import StandInRobots
+from bumblebee.stand_in.sealed import read_sealed
+from bumblebee.tracking.observing.groups import Group
+from bumblebee.tracking.observing.observations import action_middle, action_scale, joint_targets
 from bumblebee.tracking.rows import Rows
-from tasks.stand_in import cut
+from tasks.on_robot.stand_in import cut
 
 SEED = 1897
 """Seed of starts and sensor noise; neither the search of the robots nor the rounds use it."""
@@ -119,9 +119,7 @@ def try_sealed(folder: Path, motions: Motions, robots: Path) -> None:
     for path in sealed_files(robots):
         rows = follow_sealed(policy, how, clips, read_sealed(path), config.base)
         tables.append(rows.assign(robot=path.stem, sealed=json.loads(path.read_text())["sha256"]))
-    fresh = folder / f".{SEALED_TRIALS}.part"
-    pd.concat(tables, ignore_index=True).to_csv(fresh, index=False)
-    os.replace(fresh, folder / SEALED_TRIALS)
+    write_csv(folder / SEALED_TRIALS, pd.concat(tables, ignore_index=True))
 
 
 def sealed_files(robots: Path) -> list[Path]:

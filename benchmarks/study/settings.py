@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from benchmarks.baselines.methods import OURS
-from benchmarks.reward_arms import arms
+from benchmarks.study.reward_arms import arms
 from bumblebee.errors import BadInput
 from bumblebee.learning.config import PAPER, PpoConfig
 from bumblebee.tracking.config import EnvConfig
@@ -111,7 +111,7 @@ PAPER_CHANGES: dict[str, tuple[str, ...]] = {
     "ours-wide": ("adaptive", "ours", "wide"),
     "actions-seen": ("actions", "algorithm", "seen"),
 }
-"""Changes of the printed task by each arm of the part `paper-task`; rewards are in `benchmarks/reward_arms.py`."""
+"""Changes of the printed task by each arm of the part `paper-task`; rewards are in `reward_arms.py`."""
 
 
 TASK_PARTS: dict[str, tuple[str, ...]] = {

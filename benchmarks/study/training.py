@@ -26,13 +26,13 @@ from benchmarks.study.steps import GOES_ON
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.learner import CHECKPOINT
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.sampler import ClipShares
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.sampling.sampler import ClipShares
 
 CHECKPOINT_EVERY = 60
 """Iterations: some 15 s of a GPU."""

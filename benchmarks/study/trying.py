@@ -6,16 +6,16 @@ is what the study starts for each policy, on one processor core.
 """
 
 import argparse
-import os
 from pathlib import Path
 
 import pandas as pd
 import torch
 
+from benchmarks.baselines.others.follow import follow
 from benchmarks.study.jobs import job_of
 from benchmarks.study.motions import Motions, read_motions
+from benchmarks.study.on_robot import write_csv
 from benchmarks.study.others import manner
-from bumblebee.baselines.trial import follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.policy import load_policy
 from bumblebee.tracking.config import EnvConfig, Randomisation
@@ -47,9 +47,7 @@ def try_policy(folder: Path, motions: Motions) -> pd.DataFrame:
 
 def write_trials(folder: Path, motions: Motions) -> None:
     """Try the policy and write its trials, whole or not at all."""
-    fresh = folder / f".{TRIALS}.part"
-    try_policy(folder, motions).to_csv(fresh, index=False)
-    os.replace(fresh, folder / TRIALS)
+    write_csv(folder / TRIALS, try_policy(folder, motions))
 
 
 def main() -> None:

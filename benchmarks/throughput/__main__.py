@@ -29,7 +29,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.sim.effects import Effect, read_effects
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 
 UPDATES = ("eager", "captured")
 """rsl_rl's own update, and ours of `PpoConfig.captured`."""

@@ -12,7 +12,7 @@ from benchmarks.throughput.measure import environment_rate, loop_rate, make_env,
 from bumblebee.learning.config import PpoConfig
 from bumblebee.motion.clip import Clip
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 
 FRAMES = 400  # of a motion of 8 s at 50 Hz
 WORLDS = (1024, 4096, 8192, 16384)

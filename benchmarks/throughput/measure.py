@@ -16,15 +16,15 @@ import torch
 
 from benchmarks.throughput.alone import Rolled, command, listening, physics_step, without_overflow
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.learning.ranks import Ranks
 from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_spec
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
+from bumblebee.tracking.sampling.library import MotionLibrary
 
 ROUND = 25  # control steps between two looks at the clock
 TURN = 5  # the same of environment and physics in turn: short, so that few robots without resets lie on the floor

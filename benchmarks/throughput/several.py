@@ -19,7 +19,7 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ranks import join, leave
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 
 GOALS = {2: 1.8, 4: 3.5}
 TORCHRUN = "torch.distributed.run"

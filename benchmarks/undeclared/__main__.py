@@ -139,10 +139,10 @@ def _quiet() -> None:
         os.environ[name] = "1"
     import mujoco
 
-    from bumblebee.diagnosis.simulation import simulate
+    from bumblebee.diagnosis.simulation import batches
 
     mujoco.set_mju_user_warning(lambda text: None)
-    simulate.THREADS = 1
+    batches.THREADS = 1
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:

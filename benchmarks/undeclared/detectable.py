@@ -33,7 +33,7 @@ import numpy as np
 
 from benchmarks.undeclared.flight import NOISE, Flight
 from benchmarks.undeclared.restarts import HORIZON, TICKS, Windows, windows_of
-from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.stand_in.undeclared.declared import Declared
 
 CHI2 = 25.0
 _MOST, _COMPARED, _DRAWS = 160, 32, 3  # windows looked at, of these compared on a floating base, draws of their noise

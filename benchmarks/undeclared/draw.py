@@ -12,10 +12,10 @@ from benchmarks.undeclared.excite import HZ, Plan, make_plan
 from benchmarks.undeclared.flight import Flight, fly, rollouts
 from benchmarks.undeclared.lottery import Case, draw_signs
 from benchmarks.undeclared.robots import declared
-from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.deploy.undeclared.kinds import KINDS, Place, places
-from bumblebee.deploy.undeclared.law import Law
 from bumblebee.measured.rollout import Rollout
+from bumblebee.stand_in.undeclared.declared import Declared
+from bumblebee.stand_in.undeclared.kinds import KINDS, Place, places
+from bumblebee.stand_in.undeclared.law import Law
 
 SECONDS = {"arm": 5.0, "stand": 6.0, "track": 6.0}
 JUDGES = 3  # rollouts that no method sees, for the error

@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.robot.facts import stand_pose
+from bumblebee.stand_in.undeclared.declared import Declared
 
 HZ = 50.0
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.undeclared.excite import HZ, Plan, fallen
-from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.deploy.undeclared.law import Law
-from bumblebee.deploy.undeclared.simulation import TrueRobots
 from bumblebee.measured.rollout import Rollout
+from bumblebee.stand_in.undeclared.declared import Declared
+from bumblebee.stand_in.undeclared.law import Law
+from bumblebee.stand_in.undeclared.simulation import TrueRobots
 
 # Standard deviations of the sensors' white noise: rad, rad/s, rad, rad/s, m/s, m.
 NOISE = {"q": 5e-4, "v": 0.02, "quat": 0.002, "gyro": 0.01, "odometry": 0.02, "place": 0.001}

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from bumblebee.deploy.undeclared.kinds import KINDS
+from bumblebee.stand_in.undeclared.kinds import KINDS
 
 Entry = dict[str, Any]
 

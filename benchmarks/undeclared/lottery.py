@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, LATER, OUTSIDE, fits
+from bumblebee.stand_in.undeclared.kinds import CATALOGUE, KINDS, LATER, OUTSIDE, fits
 
 VERSION = 7  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
 

@@ -16,9 +16,9 @@ from scipy.linalg import hadamard
 from benchmarks.undeclared.excite import HZ
 from benchmarks.undeclared.flight import NOISE, Flight
 from benchmarks.undeclared.resume import resumed
-from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.deploy.undeclared.law import Law, Seen
-from bumblebee.deploy.undeclared.simulation import TrueRobots
+from bumblebee.stand_in.undeclared.declared import Declared
+from bumblebee.stand_in.undeclared.law import Law, Seen
+from bumblebee.stand_in.undeclared.simulation import TrueRobots
 
 HORIZON, TICKS = 5, (2, 5)  # control periods
 _FIRST = 10  # ticks before the first window

@@ -12,10 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.deploy.undeclared.law import Law, Seen
-from bumblebee.deploy.undeclared.signals import Line
-from bumblebee.deploy.undeclared.simulation import TrueRobots
+from bumblebee.stand_in.undeclared.declared import Declared
+from bumblebee.stand_in.undeclared.law import Law, Seen
+from bumblebee.stand_in.undeclared.signals import Line
+from bumblebee.stand_in.undeclared.simulation import TrueRobots
 
 
 def resumed(

@@ -2,8 +2,8 @@
 
 import mujoco
 
-from bumblebee.deploy.undeclared.declared import Declared, describe
 from bumblebee.robot.model import build_spec
+from bumblebee.stand_in.undeclared.declared import Declared, describe
 
 ARM_XML = """<mujoco model="bench_arm">
 <compiler angle="radian"/>

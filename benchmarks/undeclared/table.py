@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.undeclared.stats import bootstrap, wilson
-from bumblebee.deploy.undeclared.kinds import KINDS
+from bumblebee.stand_in.undeclared.kinds import KINDS
 
 Row = dict[str, Any]
 RIVALS = ("fit_everything", "ridge", "pace", "delta")

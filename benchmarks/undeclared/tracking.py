@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from bumblebee.deploy.episodes import start_states
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.runner import PolicyRunner, reference_library
-from bumblebee.deploy.sensors import Sensors
-from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.policy.episodes import start_states
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.runner import PolicyRunner, reference_library
 from bumblebee.quaternions import conjugate, rotate
+from bumblebee.robot.sensors import Sensors
+from bumblebee.stand_in.undeclared.declared import Declared
 
 _FAMILIES, _SHORTEST = ("stand", "squat"), 3.6  # [s]
 

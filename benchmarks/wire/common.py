@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning.export import export_shipped
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
+from bumblebee.policy.exported import ExportedPolicy
 
 
 def shipped() -> ExportedPolicy:

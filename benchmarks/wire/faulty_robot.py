@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.deploy.sensors import Sensors
+from bumblebee.robot.sensors import Sensors
 from bumblebee.sim.quiet import quiet_mujoco
 from bumblebee.wire.clock import SECOND, Clock
-from bumblebee.wire.line import LineFaults
+from bumblebee.wire.links.line import LineFaults
 from bumblebee.wire.messages import Mode, State
 from bumblebee.wire.realtime import ROBOT, harden
-from bumblebee.wire.robot import RobotSettings, WireRobot
-from bumblebee.wire.robot_process import run_robot
+from bumblebee.wire.robot_end.robot import RobotSettings, WireRobot
+from bumblebee.wire.robot_end.robot_process import run_robot
 
 until = {"nan": 0, "burst": 0}
 """When each fault is over, by the monotonic clock [ns]."""

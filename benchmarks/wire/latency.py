@@ -10,8 +10,8 @@ import psutil
 
 from benchmarks.wire.common import lasting, shipped
 from bumblebee.wire.journal import read_journal
-from bumblebee.wire.phases import Phase
 from bumblebee.wire.rollouts import latency
+from bumblebee.wire.safety.phases import Phase
 from bumblebee.wire.session import Run
 from bumblebee.wire.session import run as deploy
 

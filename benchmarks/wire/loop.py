@@ -3,13 +3,13 @@
 import argparse
 
 from benchmarks.wire.common import clips, shipped
-from bumblebee.deploy.stand_in_effects import declared_g1, entry
-from bumblebee.deploy.undeclared.kinds import KINDS, Place
 from bumblebee.measured.rollout import write_rollout
 from bumblebee.robot.facts import ROBOT, joint_names
 from bumblebee.robot.model import write_xml
+from bumblebee.stand_in.sealed import declared_g1, entry
+from bumblebee.stand_in.undeclared.kinds import KINDS, Place
+from bumblebee.wire.robot_end.stand_in import prepared, records_of
 from bumblebee.wire.rollouts import latency, rollout_of
-from bumblebee.wire.stand_in import prepared, records_of
 
 MOTIONS = ["squat", "walk_slow", "reach_low_left", "march", "arm_circles", "kick_left"]
 SEALED = (("coulomb_friction", "left_knee_joint", 4.0), ("encoder_offset", "left_shoulder_pitch_joint", 0.1))

@@ -22,12 +22,12 @@ from bumblebee.view.after_page import after_page
 from bumblebee.view.operator_page import live_page
 from bumblebee.view.sheet_page import sheet_page
 from bumblebee.wire.journal import read_journal
-from bumblebee.wire.limits import Limits, drives_of
-from bumblebee.wire.phases import Phase
+from bumblebee.wire.operator.screen import Numbers
+from bumblebee.wire.operator.sheet_file import read_sheet
+from bumblebee.wire.operator.watcher import facts_of
 from bumblebee.wire.rollouts import ended_by
-from bumblebee.wire.screen import Numbers
-from bumblebee.wire.sheet_file import read_sheet
-from bumblebee.wire.watcher import facts_of
+from bumblebee.wire.safety.limits import Limits, drives_of
+from bumblebee.wire.safety.phases import Phase
 
 WIDTHS = {1440: 1000, 390: 844}
 """Width -> height of a screen [px]."""

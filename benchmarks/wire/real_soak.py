@@ -26,10 +26,10 @@ from benchmarks.wire.soak_judge import KILLS, KINDS, judged, lost, must_damp
 from benchmarks.wire.soak_told import told
 from bumblebee.robot.facts import joint_names
 from bumblebee.wire.journal import layout, read_journal
-from bumblebee.wire.lcm_codec import Codec
-from bumblebee.wire.link import Link, open_link
+from bumblebee.wire.links.lcm_codec import Codec
+from bumblebee.wire.links.link import Link, open_link
 from bumblebee.wire.messages import ORDER, STATE
-from bumblebee.wire.phases import Phase
+from bumblebee.wire.safety.phases import Phase
 
 _PATIENCE = 240.0  # s for a run to begin, and to end
 _CLIP = 15.0  # s: longer than any fault and the wait before it

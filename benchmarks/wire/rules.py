@@ -2,7 +2,7 @@
 
 import argparse
 
-from bumblebee.wire.phases import Phase
+from bumblebee.wire.safety.phases import Phase
 from tests.wire.test_guard import TRIPS, tripped_run
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.wire.limits import Limits
-from bumblebee.wire.phases import Phase
+from bumblebee.wire.safety.limits import Limits
+from bumblebee.wire.safety.phases import Phase
 from tests.wire.small import Small, plan
 
 LIMITS = Limits()

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.wire.clock import SECOND
-from bumblebee.wire.guard import PERIOD
-from bumblebee.wire.hearing import DEADLINE
-from bumblebee.wire.limits import Limits
 from bumblebee.wire.messages import Mode, Order, State
-from bumblebee.wire.phases import Phase
+from bumblebee.wire.robot_end.hearing import DEADLINE
 from bumblebee.wire.rollouts import ended_by
+from bumblebee.wire.safety.guard import PERIOD
+from bumblebee.wire.safety.limits import Limits
+from bumblebee.wire.safety.phases import Phase
 
 LIMITS = Limits()
 SILENT = ("robot stopped", "robot killed", "states without numbers", "states in a burst")

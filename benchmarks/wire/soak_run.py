@@ -8,8 +8,8 @@ from pathlib import Path
 
 from benchmarks.wire.common import lasting
 from bumblebee.last_line import guarded
+from bumblebee.wire.robot_end.stand_in import QUICK
 from bumblebee.wire.session import Run, run
-from bumblebee.wire.stand_in import QUICK
 
 
 def main() -> int:

@@ -17,24 +17,24 @@ import pandas as pd
 
 from benchmarks.wire.common import clips, shipped
 from bumblebee import quaternions
-from bumblebee.deploy import episodes
-from bumblebee.deploy.episodes import Episode, run_episodes
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.sensors import SensorNoise
-from bumblebee.deploy.stand_in_effects import Json, read_sealed
-from bumblebee.deploy.stand_in_robots import StandInRobots
-from bumblebee.deploy.undeclared.signals import CommandDelay
 from bumblebee.evaluation.intervals import bootstrap_mean, mcnemar_test, sign_flip_test, wilson
 from bumblebee.motion.clip import Clip
+from bumblebee.policy import episodes
+from bumblebee.policy.episodes import Episode, run_episodes
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.robot.facts import joint_names
+from bumblebee.robot.sensors import SensorNoise
+from bumblebee.stand_in.body import StandInRobots
+from bumblebee.stand_in.sealed import Json, read_sealed
+from bumblebee.stand_in.undeclared.signals import CommandDelay
 from bumblebee.tracking.terminations import Stop
-from bumblebee.wire.align import aligned
 from bumblebee.wire.journal import Entry
-from bumblebee.wire.limits import Limits
-from bumblebee.wire.phases import Phase
+from bumblebee.wire.policy_end.align import aligned
 from bumblebee.wire.rehearsal import Rehearsal
+from bumblebee.wire.robot_end.stand_in import prepared, records_of
 from bumblebee.wire.rollouts import latency
-from bumblebee.wire.stand_in import prepared, records_of
+from bumblebee.wire.safety.limits import Limits
+from bumblebee.wire.safety.phases import Phase
 
 WAYS = ("stepped", "delayed", "let go", "tilt alone", "wire")
 PAIRS = (*pairwise(WAYS), ("stepped", "wire"), ("delayed", "wire"))

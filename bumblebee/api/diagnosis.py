@@ -80,7 +80,7 @@ def diagnose(
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder
     from bumblebee.diagnosis.simulation import Stop
-    from bumblebee.report.windows import windows_inlay
+    from bumblebee.report.replays.windows import windows_inlay
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()

@@ -30,7 +30,7 @@ def read_motions(
             `"embedded"` for the 59 motions that come along.
         max_seconds: cut longer motions into equal pieces of at most this length [s]; 0 cuts none.
         say: called with a line for files that are skipped; by default the line becomes a Python warning.
-        **settings: what files leave unsaid, by the fields of `bumblebee.motion.settings.ReadConfig`, such as
+        **settings: what files leave unsaid, by the fields of `bumblebee.motion.reading.settings.ReadConfig`, such as
             `csv_fps=60`; for the embedded motions the fields of `bumblebee.motion.embedded.EmbeddedConfig`.
 
     Returns:
@@ -48,8 +48,8 @@ def read_motions(
     """
     from bumblebee.motion.cache import user_cache
     from bumblebee.motion.embedded import EmbeddedConfig, make_library
-    from bumblebee.motion.folder import read_folder
-    from bumblebee.motion.settings import ReadConfig
+    from bumblebee.motion.reading.folder import read_folder
+    from bumblebee.motion.reading.settings import ReadConfig
 
     if str(path) == EMBEDDED:
         return make_library(_settings(EmbeddedConfig, settings))
@@ -162,7 +162,7 @@ def film(motion: Clip, out: str | Path, *, start: float = 0.0, end: float = 10.0
         >>> bb.film(bb.read_motions("embedded", limit=1)[0], "stand.png", end=1.0).name
         'stand.png'
     """
-    from bumblebee.report.playback import PlayConfig, write_pictures
+    from bumblebee.report.films.playback import PlayConfig, write_pictures
 
     write_pictures(Path(out), checks.motions(motion, "motion")[0], PlayConfig(start=start, end=end))
     return Path(out)

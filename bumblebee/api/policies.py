@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import torch
 
-    from bumblebee.deploy.policy import ExportedPolicy
     from bumblebee.learning.policy import Policy
+    from bumblebee.policy.exported import ExportedPolicy
 
 PHYSICS_HZ = 200.0
 
@@ -39,9 +39,9 @@ def load_policy(folder: str | Path = "shipped") -> "Policy | Deployed":
         >>> policy(torch.zeros(1, 283)).shape
         torch.Size([1, 23])
     """
-    from bumblebee.deploy.policy import ExportedPolicy
     from bumblebee.learning import policy as trained
     from bumblebee.learning import pretrained
+    from bumblebee.policy.exported import ExportedPolicy
 
     place = pretrained.SHIPPED.get(str(folder)) or Path(folder).expanduser()
     if (place / "policy.onnx").exists() and not (place / trained.FILE).exists():
@@ -106,10 +106,10 @@ def evaluate(
         >>> table["success"].tolist()
         [True, True]
     """
-    from bumblebee.deploy.trial import try_exported
     from bumblebee.io.write import refuse_existing, try_output
     from bumblebee.learning.trial import Trials, World, try_policy
     from bumblebee.learning.trial_folder import Kept
+    from bumblebee.policy.trial import try_exported
     from bumblebee.sim.sensors import load_model
 
     clips, own, kept = checks.motions(motions), _loaded(policy), Kept()
@@ -150,12 +150,12 @@ def follow(policy: "Policy | Deployed | str | Path", motion: Clip) -> Clip:
     """
     import torch
 
-    from bumblebee.deploy.trial import follow_exported
     from bumblebee.learning.rollout import Manner, roll_out
     from bumblebee.motion.kinematics import make_clip
+    from bumblebee.policy.trial import follow_exported
     from bumblebee.sim.engine_choice import make_engine
     from bumblebee.sim.sensors import load_model
-    from bumblebee.tracking.library import MotionLibrary
+    from bumblebee.tracking.sampling.library import MotionLibrary
 
     clip, own = checks.motions(motion, "motion")[0], _loaded(policy)
     if isinstance(own, Deployed):

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bumblebee.deploy.card_text import CARD, NOTHING, card_text, made_from
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.intervals import mean_by_motion, success_rate
 from bumblebee.io.read import read_json
 from bumblebee.learning import pretrained
 from bumblebee.learning.trial import success_by_family
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.licence_terms import counted
+from bumblebee.motion.licences.terms import counted
+from bumblebee.policy.card_text import CARD, NOTHING, card_text, made_from
 from bumblebee.report.wording import plural
 
 SPLITS = {"train": "trained on", "test": "held out"}

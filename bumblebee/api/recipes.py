@@ -7,8 +7,8 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.policy import Policy, Shape
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.needs import needed
-from bumblebee.tracking.terms import expanded
+from bumblebee.tracking.observing.needs import needed
+from bumblebee.tracking.observing.terms import expanded
 
 GENTLE = PpoConfig(learning_rate=1e-4, learning_rate_range=(1e-5, 1e-3), desired_kl=0.01, desired_kl_end=0.01)
 """PPO from a policy that can follow motions already: higher rates make it forget (docs/training-studies.md)."""

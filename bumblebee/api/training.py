@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bumblebee.api import checks
-from bumblebee.deploy.card_text import CARD, NOTHING
 from bumblebee.errors import BadInput
 from bumblebee.io.write import new_folder, refuse_foreign, try_output
 from bumblebee.last_line import Stopped
 from bumblebee.motion.clip import Clip
+from bumblebee.policy.card_text import CARD, NOTHING
 from bumblebee.ranges import Few, Name, PartOf, Range, Ranged, Seed
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def train(
         True
     """
     from bumblebee.api.policy_card import learnt_before
-    from bumblebee.motion.filter import filter_clips
+    from bumblebee.motion.filters.rules import filter_clips
     from bumblebee.motion.pieces import hold_out, too_few
     from bumblebee.report.wording import plural
 
@@ -151,8 +151,8 @@ def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "L
     from bumblebee.learning.policy import load_policy
     from bumblebee.sim.engine_choice import make_engine
     from bumblebee.tracking.env import TrackingEnv
-    from bumblebee.tracking.library import MotionLibrary
     from bumblebee.tracking.model import task_model
+    from bumblebee.tracking.sampling.library import MotionLibrary
 
     torch.set_num_threads(config.threads)
     own, parent = task(config.gpu, config.threads), parent_of(config.start)
@@ -252,7 +252,7 @@ def _kept(
     from bumblebee.api.policy_card import card_of, readme
     from bumblebee.learning.export import CONTRACT, export_policy
     from bumblebee.learning.learner import CURVE
-    from bumblebee.report.playback import write_pictures
+    from bumblebee.report.films.playback import write_pictures
 
     policy, parent = learner.policy(), parent_of(config.start)
     after = evaluate(policy, clips, threads=config.threads)

@@ -212,7 +212,7 @@ class Kind:
         )
 
     def undo(self, draft: Any, effect: Given, columns: Sequence[int]) -> tuple[str, str]:
-        """Put it into `deploy.compensation_draft.Draft` on the joints `columns`: what is done, with which numbers.
+        """Put it into `compensation.draft.Draft` on the joints `columns`: what is done, with which numbers.
 
         Raises:
             CannotUndo: if it cannot be undone at the joint.

@@ -15,7 +15,7 @@ def spread(values: np.ndarray, unit: str, digits: int = 3) -> str:
 
 
 def fed_along(draft: Any) -> str:
-    """How friction is undone, by `deploy.compensation_draft.Draft`."""
+    """How friction is undone, by `compensation.draft.Draft`."""
     return f"{100 * draft.limits.friction_share:.0f} % fed forward along the intended velocity"
 
 

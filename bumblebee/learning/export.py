@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from bumblebee.learning import pretrained
+from bumblebee.learning.generalist.transformer import TransformerModel
 from bumblebee.learning.onnx_graph import IR_VERSION, OPSET, Graph, behind_memory, layers, normalised
 from bumblebee.learning.policy import Policy, load_policy
-from bumblebee.learning.transformer import TransformerModel
 from bumblebee.robot.facts import ROBOT, joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
-from bumblebee.tracking.needs import needed
-from bumblebee.tracking.observations import action_scale
-from bumblebee.tracking.terms import expanded, parts
+from bumblebee.tracking.observing.needs import needed
+from bumblebee.tracking.observing.observations import action_scale
+from bumblebee.tracking.observing.terms import expanded, parts
 
 ONNX, CONTRACT = "policy.onnx", "contract.json"
 
@@ -64,8 +64,8 @@ def contract(
 
     "observation" lists the parts of one control step; the input has "history" of them, the oldest first, and then the
     parts "observation_now" of the newest step alone. "sensors" names the readings that it takes
-    (`tracking.needs.READINGS`), and no other has any effect. A policy with a memory has "memory": zeros of that shape
-    go in at a clip's start, then what the step before gave out.
+    (`tracking.observing.needs.READINGS`); no other has any effect. A policy with a memory has "memory": zeros of its
+    shape go in at a clip's start, then what the step before gave out.
     """
     table, counts = [gains(joint) for joint in joints()], (len(joints()), len(ahead))
     looks_ahead = any(name.startswith("ahead") for name, _ in parts((*seen.terms, *seen.now), *counts))

@@ -3,7 +3,7 @@
 from rsl_rl.models import MLPModel
 from torch import Tensor
 
-from bumblebee.learning.transformer import TransformerModel
+from bumblebee.learning.generalist.transformer import TransformerModel
 
 
 def gaussian_kl(mean: Tensor, std: Tensor, other_mean: Tensor, other_std: Tensor) -> Tensor:

@@ -6,14 +6,14 @@ from typing import Literal
 
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.learner import Learner
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.motion.clip import Clip
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.reflection import with_reflections
-from bumblebee.tracking.sampler import ClipShares
+from bumblebee.tracking.sampling.reflection import with_reflections
+from bumblebee.tracking.sampling.sampler import ClipShares
 
 Name = Literal["ppo", "world_model"]
 Config = PpoConfig | WorldModelConfig

@@ -7,8 +7,8 @@ import torch
 from rsl_rl.models import MLPModel
 from torch import Tensor, nn
 
-from bumblebee.learning.attention import GatedBlock, GruGate, WindowAttention
-from bumblebee.learning.transformer import TransformerModel
+from bumblebee.learning.generalist.attention import GatedBlock, GruGate, WindowAttention
+from bumblebee.learning.generalist.transformer import TransformerModel
 
 OPSET, IR_VERSION = 17, 8  # read by every onnxruntime since 1.14
 

@@ -13,8 +13,8 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
+from bumblebee.learning.generalist.transformer import TransformerConfig, TransformerModel
 from bumblebee.learning.pretrained import NO_POLICY
-from bumblebee.learning.transformer import TransformerConfig, TransformerModel
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
 
@@ -33,7 +33,7 @@ class Shape:
     ahead: tuple[float, ...]
     """Look-ahead times [s] of the reference."""
     terms: tuple[str, ...] = ("demo",)
-    """Terms of the observation, see `tracking.terms`."""
+    """Terms of the observation, see `tracking.observing.terms`."""
     history: int = 1
     """Control steps of the observation, the oldest first."""
     now: tuple[str, ...] = ()

@@ -20,7 +20,7 @@ from torch import Tensor
 from torch import distributed as dist
 
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
-from bumblebee.learning.update_graph import forget_recordings
+from bumblebee.learning.ppo.update_graph import forget_recordings
 
 T = TypeVar("T")
 _LAUNCHED = "BUMBLEBEE_LAUNCHED"

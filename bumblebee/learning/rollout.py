@@ -1,8 +1,8 @@
 """The rollout of a policy on its reference motions in a simulator whose true state is known, and its judge.
 
-`learning/trial.py` tries policies before and after a training with it, `baselines/trial.py` compares methods. What
-runs on readings with noise and writes logs, as a robot does, is `deploy/episodes.py`. All end by
-`tracking/terminations.py`.
+`learning/trial.py` tries policies before and after a training with it; policies that are compared are judged by
+`learning/three_rules.py`. What runs on readings with noise and writes logs, as a robot does, is `policy/episodes.py`.
+All end by `tracking/terminations.py`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -16,11 +16,11 @@ from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import ActionAdapter
-from bumblebee.tracking.groups import Group
-from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
-from bumblebee.tracking.observations import action_middle, action_scale, middle_targets
+from bumblebee.tracking.observing.groups import Group
+from bumblebee.tracking.observing.observations import action_middle, action_scale, middle_targets
 from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.starts import start_state
+from bumblebee.tracking.sampling.library import MotionLibrary, ReferenceFrame
+from bumblebee.tracking.sampling.starts import start_state
 from bumblebee.tracking.terminations import fallen, success_threshold
 
 

@@ -17,7 +17,7 @@ from bumblebee.sim.effects import RuntimeHooks
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import ActionAdapter
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 
 _WORLDS = 128  # at once
 

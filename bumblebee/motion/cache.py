@@ -22,6 +22,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
 from bumblebee.io.read import npz_arrays, read_bytes
+from bumblebee.io.whole import put
 
 Arrays = dict[str, np.ndarray]
 
@@ -105,16 +106,10 @@ def _read(path: Path) -> Arrays | None:
 
 def _write(path: Path, data: bytes) -> bool:
     """Put an entry in its place; False where the disk does not take it, since what was made is good all the same."""
-    fresh = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fresh.write_bytes(data)
-        os.replace(fresh, path)
+        put(path, data)
     except OSError:
         return False
-    finally:
-        with contextlib.suppress(OSError):
-            fresh.unlink(missing_ok=True)
     return True
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.io.write import new_folder, write_file
-from bumblebee.motion.convert import Converted, Names, claim
+from bumblebee.motion.formats.convert import Converted, Names, claim
 from bumblebee.motion.human.motion import HumanMotion
-from bumblebee.motion.licence_table import LICENCES, Stated, table_of
-from bumblebee.motion.listing import Found, find_motions, reason_of
-from bumblebee.motion.nothing import nothing
-from bumblebee.motion.one_file import FileConfig
+from bumblebee.motion.licences.table import LICENCES, Stated, table_of
+from bumblebee.motion.reading.listing import Found, find_motions, reason_of
+from bumblebee.motion.reading.nothing import nothing
+from bumblebee.motion.reading.one_file import FileConfig
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.mapping import Robot, g1, read_robot
 from bumblebee.motion.retarget.retarget import aim, fit, fit_notes, root_quat

@@ -6,10 +6,10 @@ import pandas as pd
 import torch
 from torch import Tensor
 
-from bumblebee.baselines.geometry import heading_inverse, turned
-from bumblebee.baselines.trial import ThreeRules
 from bumblebee.learning.rollout import Tick
+from bumblebee.learning.three_rules import ThreeRules
 from bumblebee.motion.clip import Clip
+from bumblebee.peers.geometry import heading_inverse, turned
 from bumblebee.tracking.terminations import fallen
 
 

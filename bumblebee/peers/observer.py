@@ -8,7 +8,7 @@ from torch import Tensor
 from bumblebee.peers.contract import Block, PeerContract, Term
 from bumblebee.peers.terms import TERMS, Seen
 from bumblebee.sim.engine import RobotState
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.sampling.library import ReferenceFrame
 
 Reference = Callable[[int], ReferenceFrame]
 """The reference so many control steps after now, its joints in the contract's order."""

@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bumblebee.deploy.policy_checks import check_self_contained
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
 from bumblebee.peers.contract import PeerContract, read_contract
+from bumblebee.policy.checks import check_self_contained
 
 if TYPE_CHECKING:
     import onnxruntime

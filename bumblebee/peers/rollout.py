@@ -12,8 +12,8 @@ from bumblebee.peers.observer import Observer
 from bumblebee.peers.policy import Peer
 from bumblebee.robot.facts import joint_names
 from bumblebee.sim.engine import Engine, RobotState
-from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
-from bumblebee.tracking.starts import start_state
+from bumblebee.tracking.sampling.library import MotionLibrary, ReferenceFrame
+from bumblebee.tracking.sampling.starts import start_state
 
 
 class JointOrder:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from bumblebee.baselines.geometry import roll_pitch_yaw
+from bumblebee.peers.geometry import roll_pitch_yaw
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import rotate_inverse
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.sampling.library import ReferenceFrame
 
 
 @dataclass(frozen=True)

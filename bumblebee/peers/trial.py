@@ -21,7 +21,7 @@ from bumblebee.peers.world import PHYSICS_HZ, Whose, peer_model
 from bumblebee.sim.engine import Engine
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 
 CONTROL_HZ = 50.0
 _WORLDS = 128  # at once

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any
 
-from bumblebee.report.figures import short_joint
+from bumblebee.report.charts.figures import short_joint
 from bumblebee.sim.effects import CATALOGUE
 
 Json = dict[str, Any]

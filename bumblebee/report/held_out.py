@@ -1,7 +1,7 @@
 """The joint error on held-out rollouts, before and after, beside its noise floor."""
 
 from bumblebee.report import noise_floor
-from bumblebee.report.residual_chart import value_and_interval
+from bumblebee.report.charts.residual_chart import value_and_interval
 from bumblebee.report.results import Json, RoundResults
 from bumblebee.report.wording import number, plural
 

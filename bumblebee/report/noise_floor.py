@@ -6,7 +6,7 @@ interval of its own, and a measured error may come out below it by chance, or be
 
 from collections.abc import Sequence
 
-from bumblebee.report.residual_chart import value_and_interval
+from bumblebee.report.charts.residual_chart import value_and_interval
 from bumblebee.report.results import Json
 from bumblebee.report.wording import plural
 

@@ -13,10 +13,10 @@ from jinja2 import Environment, select_autoescape
 from markupsafe import Markup
 
 from bumblebee.io.page_policy import policy
-from bumblebee.report import replay as replays_of
-from bumblebee.report.chart import Strip
-from bumblebee.report.filmstrip import Sheet
-from bumblebee.report.replay_page import holder, style
+from bumblebee.report.charts.chart import Strip
+from bumblebee.report.films.filmstrip import Sheet
+from bumblebee.report.replays import replay as replays_of
+from bumblebee.report.replays.replay_page import holder, style
 
 
 @dataclass(frozen=True)

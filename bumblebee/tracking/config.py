@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 from bumblebee.ranges import Factor, Few, Name, PartOf, Range, Ranged, Seconds, Seed, Share, Size, Unfit
 from bumblebee.sim.engine_choice import Name as EngineName
 from bumblebee.sim.warp_limits import Buffers
-from bumblebee.tracking.library import AHEAD
+from bumblebee.tracking.observing.terms import SETS, TERMS
 from bumblebee.tracking.rewards import RewardConfig
-from bumblebee.tracking.terms import SETS, TERMS
+from bumblebee.tracking.sampling.library import AHEAD
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Terrain(Ranged):
 
 @dataclass(frozen=True)
 class ObservationConfig(Ranged):
-    """Observation of a network: terms of `tracking.terms.TERMS`, or names of sets of them, over some control steps."""
+    """Observation of a network: of `tracking.observing.terms.TERMS`, or names of sets of them, over some steps."""
 
     terms: tuple[Name, ...] = ("demo",)
     """Names of terms in order; `teacher` and `student` stand for sets of them. Without any: no such group."""

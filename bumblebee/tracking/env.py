@@ -17,23 +17,23 @@ from torch import Tensor
 from bumblebee.sim.cuda_graph import Captured
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.groups import Group
 from bumblebee.tracking.in_place import renewed
-from bumblebee.tracking.library import MotionLibrary, ReferenceFrame, over_robot
-from bumblebee.tracking.observations import action_middle, action_scale, middle_targets
-from bumblebee.tracking.pushes import Pushes
-from bumblebee.tracking.randomisation import randomise_worlds
+from bumblebee.tracking.observing.groups import Group
+from bumblebee.tracking.observing.observations import action_middle, action_scale, middle_targets
+from bumblebee.tracking.observing.sensor_errors import SensorErrors
+from bumblebee.tracking.observing.terms import expanded, see
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.sampler import ClipShares
-from bumblebee.tracking.sensor_errors import SensorErrors
-from bumblebee.tracking.starts import start_state
+from bumblebee.tracking.sampling.library import MotionLibrary, ReferenceFrame, over_robot
+from bumblebee.tracking.sampling.sampler import ClipShares
+from bumblebee.tracking.sampling.starts import start_state
+from bumblebee.tracking.sampling.stretches import StretchSampler, sampler_of
 from bumblebee.tracking.statistics import Statistics
-from bumblebee.tracking.stretches import StretchSampler, sampler_of
 from bumblebee.tracking.terminations import fallen, threshold_at
-from bumblebee.tracking.terms import expanded, see
-from bumblebee.tracking.terrain import Ground
 from bumblebee.tracking.threads import Aside, one_thread
+from bumblebee.tracking.worlds.pushes import Pushes
+from bumblebee.tracking.worlds.randomisation import randomise_worlds
+from bumblebee.tracking.worlds.terrain import Ground
 
 ActionAdapter = Callable[[RobotState, Tensor, Tensor], Tensor]
 """(state, joint targets (B, J) [rad] of an action of zero, action (B, J)) -> what the motors execute, (B, J)."""

@@ -12,7 +12,7 @@ from torch import Tensor
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import FEET, KEY_BODIES, joints
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.terms import Part, parts
+from bumblebee.tracking.observing.terms import Part, parts
 
 Reflection = tuple[list[int], list[float]]
 """For each entry of a reflected vector the entry that it comes from, and the sign that it gets."""

@@ -1,7 +1,7 @@
 """The simulated model of a task: the declared or corrected robot with the ground and the delays that the task asks for.
 
 Delays and terrain change a model's layout and must be there when it is compiled; how long each world's delay is belongs
-to its fields (`tracking.randomisation`).
+to its fields (`tracking.worlds.randomisation`).
 """
 
 from pathlib import Path
@@ -11,7 +11,7 @@ import mujoco
 from bumblebee.robot.drives import buffer_length
 from bumblebee.sim.sensors import load_spec
 from bumblebee.tracking.config import EnvConfig, Randomisation
-from bumblebee.tracking.terrain import add_terrain
+from bumblebee.tracking.worlds.terrain import add_terrain
 
 
 def task_model(config: EnvConfig, path: Path | None = None) -> mujoco.MjModel:

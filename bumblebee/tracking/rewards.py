@@ -15,7 +15,7 @@ from bumblebee.ranges import Factor, Name, Range, Ranged, Share, Weight
 from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import angle_between, length3, rotate
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.sampling.library import ReferenceFrame
 from bumblebee.tracking.terminations import threshold_at
 
 

@@ -8,7 +8,7 @@ from torch import Tensor
 from bumblebee.motion.clip import Clip, travels
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import length3, up_axis
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.sampling.library import ReferenceFrame
 
 LOOSE, TIGHT = 0.8, 0.4  # m: how far a key body may be off in motions that travel, and in all others
 

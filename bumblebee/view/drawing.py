@@ -5,8 +5,8 @@ from pathlib import Path
 
 import mujoco
 
-from bumblebee.report.looks import dress, is_g1
-from bumblebee.report.replay import Drawn
+from bumblebee.report.films.looks import dress, is_g1
+from bumblebee.report.replays.replay import Drawn
 from bumblebee.robot.model import build_spec
 
 OTHERS = 1

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from bumblebee.deploy.episodes import start_states
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.robots import CONTROL_HZ, NominalRobots
-from bumblebee.deploy.runner import PolicyRunner, reference_library
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.motion.clip import Clip, clip_states
-from bumblebee.report.replay import Drawn
+from bumblebee.policy.episodes import start_states
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.robots import CONTROL_HZ, NominalRobots
+from bumblebee.policy.runner import PolicyRunner, reference_library
+from bumblebee.report.replays.replay import Drawn
 from bumblebee.tracking.terminations import FALL, beyond
 from bumblebee.view.sources import REFERENCE
 

@@ -8,7 +8,7 @@ import mujoco
 
 from bumblebee.diagnosis.dataset import open_session
 from bumblebee.measured.model_file import load_spec
-from bumblebee.report.windows import SeenWindow, seen_windows
+from bumblebee.report.replays.windows import SeenWindow, seen_windows
 from bumblebee.sim.effects import Effect
 from bumblebee.view.sources import Entry, Recorded
 

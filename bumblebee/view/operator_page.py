@@ -29,7 +29,7 @@ def live_page(run: Mapping[str, Any], facts: Mapping[str, Any] | None, age: floa
 
     Args:
         run: `policy`, its `hz`, `motion`, its `seconds`, `robot` (simulated or REAL), `sheet` (a line, or "").
-        facts: newest of `bumblebee.wire.watcher.facts_of`; None before the first.
+        facts: newest of `bumblebee.wire.operator.watcher.facts_of`; None before the first.
         age: of the facts [s].
     """
     now = _now(run, facts or {}, age)

@@ -8,10 +8,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from bumblebee.errors import BadInput
-from bumblebee.wire import packets
-from bumblebee.wire.watcher import Watcher
+from bumblebee.wire.links import packets
+from bumblebee.wire.operator.watcher import Watcher
 
-SERVER = "flows.operator_server"
+SERVER = "flows.servers.operator_server"
 """Module that serves it behind the login of the workspace's pages; as text, since the library imports no flows."""
 _PATIENCE = 5.0  # s for its end
 

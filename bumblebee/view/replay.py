@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 
 from bumblebee.io.write import write_file
-from bumblebee.report.film_file import write_film
-from bumblebee.report.replay import Take, part
-from bumblebee.report.replay_page import replay_page
-from bumblebee.report.replay_still import film_frames
-from bumblebee.report.shape import shape
+from bumblebee.report.films.film_file import write_film
+from bumblebee.report.replays.replay import Take, part
+from bumblebee.report.replays.replay_page import replay_page
+from bumblebee.report.replays.replay_still import film_frames
+from bumblebee.report.replays.shape import shape
 from bumblebee.robot.model import build_spec
 from bumblebee.view.sources import Source
 

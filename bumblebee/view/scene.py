@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from mjviser import ViserMujocoScene
 
-from bumblebee.report.replay import Drawn
+from bumblebee.report.replays.replay import Drawn
 from bumblebee.view.drawing import OTHERS, drawing
 
 _CAMERA = np.array([1.9, -1.9, 0.7])  # m from what it looks at

@@ -1,9 +1,9 @@
 """A run sheet as one self-contained page: motions in the order of their risk, what to watch, when to stop."""
 
 from bumblebee.report.page import Block, Cell, Section, note, pairs, render, table, text, warning
-from bumblebee.wire.sheet import Sheet, Tried
-from bumblebee.wire.sheet_file import watch
-from bumblebee.wire.uses import DAMPING
+from bumblebee.wire.operator.sheet import Sheet, Tried
+from bumblebee.wire.operator.sheet_file import watch
+from bumblebee.wire.safety.uses import DAMPING
 
 _HEADER = ("motion", "not to its end [95 %]", "fell", "damped", "largest tilt", "nearest joint end", "watch")
 

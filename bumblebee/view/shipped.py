@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning.export import export_shipped
 from bumblebee.learning.pretrained import require_seen
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import Kind, kinds
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.view.live import LivePolicy
 from bumblebee.view.sources import Entry, Source
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip, clip_states
-from bumblebee.report.replay import GHOST, Drawn
+from bumblebee.report.replays.replay import GHOST, Drawn
 
 REFERENCE = Drawn("reference", GHOST)
 """The motion that a policy follows."""

@@ -4,16 +4,16 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.robots import CONTROL_HZ
 from bumblebee.errors import BadInput
 from bumblebee.learning.trial_folder import ENDS, FOLLOWED, KeptRollout, is_kept, read_kept
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.convert import clips_at
-from bumblebee.motion.few_lines import said_of
-from bumblebee.motion.nothing import nothing
-from bumblebee.motion.one_file import FileConfig
-from bumblebee.report.replay import Drawn, side_by_side
+from bumblebee.motion.formats.convert import clips_at
+from bumblebee.motion.reading.few_lines import said_of
+from bumblebee.motion.reading.nothing import nothing
+from bumblebee.motion.reading.one_file import FileConfig
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.robots import CONTROL_HZ
+from bumblebee.report.replays.replay import Drawn, side_by_side
 from bumblebee.robot.facts import joint_names
 from bumblebee.view.live import LivePolicy
 from bumblebee.view.shipped import embedded_entries

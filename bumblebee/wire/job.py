@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.wire.limits import Drives, Limits
-from bumblebee.wire.phases import Ramps
 from bumblebee.wire.plan import Plan
+from bumblebee.wire.safety.limits import Drives, Limits
+from bumblebee.wire.safety.phases import Ramps
 
 
 @dataclass(frozen=True)

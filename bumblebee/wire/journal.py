@@ -17,10 +17,10 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.io.names import require_stem
-from bumblebee.wire.guard import Tick
-from bumblebee.wire.lcm_codec import MAX_JOINTS
+from bumblebee.wire.links.lcm_codec import MAX_JOINTS
 from bumblebee.wire.messages import State
-from bumblebee.wire.rules import RULES
+from bumblebee.wire.safety.guard import Tick
+from bumblebee.wire.safety.rules import RULES
 
 _MARK, _SCHEMA = 0xB0B0_0001, 1
 _SYNC = 0.5  # s between two times that the disk is waited for

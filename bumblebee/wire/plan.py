@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bumblebee.wire.limits import Limits
-from bumblebee.wire.phases import Ramps
+from bumblebee.wire.safety.limits import Limits
+from bumblebee.wire.safety.phases import Ramps
 
 ORDER_HZ = 200
 """Orders to the drives a second."""

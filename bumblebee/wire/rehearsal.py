@@ -7,17 +7,17 @@ import heapq
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from bumblebee.wire.brain import Brain
 from bumblebee.wire.clock import SECOND
-from bumblebee.wire.guard import PERIOD, Guard, Tick
 from bumblebee.wire.journal import Entry
-from bumblebee.wire.keys import Keys
-from bumblebee.wire.lcm_codec import Codec
-from bumblebee.wire.limits import Drives
+from bumblebee.wire.links.lcm_codec import Codec
 from bumblebee.wire.messages import STATE
+from bumblebee.wire.operator.keys import Keys
 from bumblebee.wire.plan import Plan
-from bumblebee.wire.questions import Answer
-from bumblebee.wire.robot import WireRobot
+from bumblebee.wire.policy_end.brain import Brain
+from bumblebee.wire.policy_end.questions import Answer
+from bumblebee.wire.robot_end.robot import WireRobot
+from bumblebee.wire.safety.guard import PERIOD, Guard, Tick
+from bumblebee.wire.safety.limits import Drives
 
 _STEP = SECOND // 1000
 

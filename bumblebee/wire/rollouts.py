@@ -16,8 +16,8 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.wire_note import wire_note
-from bumblebee.wire.phases import Phase
-from bumblebee.wire.rules import RULES, Step
+from bumblebee.wire.safety.phases import Phase
+from bumblebee.wire.safety.rules import RULES, Step
 
 _MEASURED = ("joint_pos", "joint_vel", "joint_torque", "base_quat", "base_ang_vel", "base_lin_vel")
 

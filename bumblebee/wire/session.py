@@ -7,28 +7,28 @@ from pathlib import Path
 
 import numpy as np
 
-from bumblebee.deploy.compensation import Compensation
-from bumblebee.deploy.compensation_file import read_compensation
-from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.compensation.file import read_compensation
+from bumblebee.compensation.numbers import Compensation
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import write_rollout
 from bumblebee.motion.clip import Clip
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.robot.facts import ROBOT
 from bumblebee.robot.model import write_xml
-from bumblebee.wire.brain import Brain
 from bumblebee.wire.clock import Clock
-from bumblebee.wire.console import Ended, operate
-from bumblebee.wire.intake import numbers_for
 from bumblebee.wire.job import Job
 from bumblebee.wire.journal import read_journal
-from bumblebee.wire.limits import Limits, drives_of
-from bumblebee.wire.link import open_link
+from bumblebee.wire.links.link import open_link
 from bumblebee.wire.messages import CARD, STATE
-from bumblebee.wire.phases import Ramps
+from bumblebee.wire.operator.console import Ended, operate
+from bumblebee.wire.operator.watcher import Watcher
 from bumblebee.wire.plan import ORDER_HZ, Plan
-from bumblebee.wire.preflight import Wanted, check, meet, new_controller
+from bumblebee.wire.policy_end.brain import Brain
 from bumblebee.wire.rollouts import new_id, rollout_of
-from bumblebee.wire.watcher import Watcher
+from bumblebee.wire.safety.intake import numbers_for
+from bumblebee.wire.safety.limits import Limits, drives_of
+from bumblebee.wire.safety.phases import Ramps
+from bumblebee.wire.safety.preflight import Wanted, check, meet, new_controller
 
 JOURNAL = ".journal"
 """Ending of a journal's name."""

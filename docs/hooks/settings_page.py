@@ -1,4 +1,4 @@
-"""The page of all settings, written from the dataclasses of `tasks.params.SECTIONS` without importing their modules."""
+"""The page of all settings, from the dataclasses of `tasks.settings.params.SECTIONS`, without an import of them."""
 
 import ast
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ def settings_page() -> str:
     for package in ("bumblebee", "tasks"):
         loader.load(package)
     loader.resolve_aliases()
-    params = loader.modules_collection["tasks.params"]["SECTIONS"].value
+    params = loader.modules_collection["tasks.settings.params"]["SECTIONS"].value
     sections = {name: place.replace(":", ".") for name, place in ast.literal_eval(str(params)).items()}
     tables = {path: f"`{name}`" for name, path in sections.items()}
     text, written = [HEAD], set()

@@ -6,8 +6,8 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from tasks.lineage import git_sha
-from tasks.run_form import fitted
+from tasks.running.lineage import git_sha
+from tasks.running.run_form import fitted
 
 # Characters that MLflow's tables hold; what is longer says so there and is whole in the file that it names.
 LONGEST_PARAM, LONGEST_TAG, LONGEST_DESCRIPTION = 6000, 5000, 5000

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bumblebee.errors import BadInput
-from tasks.lab import read_lab
-from tasks.lab_serve import read_tracking
-from tasks.lineage import history, lineage
+from tasks.lab.serve import read_tracking
+from tasks.lab.servers import read_lab
 from tasks.registry.labels import CARD, LINEAGE, LONGEST_DESCRIPTION, as_text, fitted_tags, origin_tags
 from tasks.registry.store import DATABASE, SERVERS, of_server, prepare
-from tasks.run_form import card_settings, fitted
+from tasks.running.lineage import history, lineage
+from tasks.running.run_form import card_settings, fitted
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient

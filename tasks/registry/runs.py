@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tasks.lineage import current_stage, inputs_of_stage, lineage, place
-from tasks.outputs import MANIFEST, copied, manifest
 from tasks.registry.labels import LINEAGE, LONGEST_PARAM, as_text, fitted_tags, origin_tags
 from tasks.registry.store import experiment_name, prepare
-from tasks.run_form import Metric, by_step, fitted, flatten, metric_name, read_curve
+from tasks.running.lineage import current_stage, inputs_of_stage, lineage, place
+from tasks.running.outputs import MANIFEST, copied, manifest
+from tasks.running.run_form import Metric, by_step, fitted, flatten, metric_name, read_curve
 
 
 def log_run(
@@ -25,7 +25,7 @@ def log_run(
     outputs: Sequence[Path] | None = None,
     begun: float | None = None,
 ) -> str:
-    """Write one finished run with its outputs (`tasks/outputs.py`); returns its id.
+    """Write one finished run with its outputs (`tasks/running/outputs.py`); returns its id.
 
     Args:
         stage: the stage's name.

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bumblebee.errors import BadInput
-from tasks.database import ensure
-from tasks.lab import MlflowLab, read_lab
-from tasks.lab_checks import one_at_a_time
-from tasks.lab_serve import read_tracking
-from tasks.private import private
+from tasks.lab.checks import one_at_a_time
+from tasks.lab.database import ensure
+from tasks.lab.private import private
+from tasks.lab.serve import read_tracking
+from tasks.lab.servers import MlflowLab, read_lab
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient

@@ -20,7 +20,7 @@ from bumblebee.api.recipes import as_seen_by
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.motion.pieces import hold_out
 from bumblebee.tracking.config import EnvConfig
-from tests.deploy.conftest import nod
+from tests.policy.conftest import nod
 
 PAGE = Path(__file__).parents[2] / "docs" / "api.md"
 T = 4
@@ -33,7 +33,7 @@ FILES = {"policy.pt", "policy.onnx", "contract.json", "card.json", "README.md", 
 def quick(tmp_path, monkeypatch):
     """Work in a folder of its own; embedded motions are made once, films painted."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("bumblebee.report.playback.render_frames", lambda *rest: (None, "not here"))
+    monkeypatch.setattr("bumblebee.report.films.playback.render_frames", lambda *rest: (None, "not here"))
     monkeypatch.setattr("bumblebee.motion.embedded.make_library", lambda config: STAND[: config.limit])
 
 
@@ -145,7 +145,7 @@ def test_ppo_from_a_policy_without_a_critic_lets_the_value_learn_first(tmp_path)
 
 
 def test_a_training_that_cannot_be_is_refused_before_motions_are_read(monkeypatch):
-    monkeypatch.setattr("bumblebee.motion.folder.read_folder", lambda *rest, **more: pytest.fail("read"))
+    monkeypatch.setattr("bumblebee.motion.reading.folder.read_folder", lambda *rest, **more: pytest.fail("read"))
     monkeypatch.setattr("torch.cuda.is_available", lambda: False)
     Path("motions").mkdir()
     with pytest.raises(bb.BadInput, match=r"engine mujoco_warp: expected (the packages|an NVIDIA GPU)"):
@@ -179,7 +179,7 @@ def test_a_training_that_was_killed_goes_on(monkeypatch):
     assert told[-1] == f"the last checkpoint is kept in {place}; the same command goes on from it"
     iterations = []
     monkeypatch.setattr(training, "_kept", lambda learner, *rest: iterations.append(learner.iteration))
-    monkeypatch.setattr("bumblebee.learning.ppo.Trainer._iterate", lambda self: pytest.fail("trained again"))
+    monkeypatch.setattr("bumblebee.learning.ppo.learner.Trainer._iterate", lambda self: pytest.fail("trained again"))
     bb.train(STAND, "policy", minutes=0.005, worlds=8)
     assert iterations[0] >= 1 and not Path(".policy.training").exists()
 

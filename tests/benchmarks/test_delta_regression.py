@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.delta_regression import ROBOTS, fitted, main, sealed, table
-from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.learning.delta.action import DeltaConfig, RegressionConfig
+from bumblebee.stand_in.sealed import read_sealed
 from tests.learning.swaying import ANKLES, record, weakened
 
 CONFIG = DeltaConfig(num_envs=60, regression=RegressionConfig(windows=600, passes=2, folds=6))

@@ -9,9 +9,9 @@ import pytest
 
 from benchmarks import generalist
 from benchmarks.generalist import ARMS, Case, equal_mlp, measured, read_done, run, settings_of, shipped
-from bumblebee.learning.distill import DistillConfig
+from bumblebee.learning.generalist.distill import DistillConfig
+from bumblebee.learning.generalist.transformer import TransformerConfig
 from bumblebee.learning.policy import Shape, new_actor
-from bumblebee.learning.transformer import TransformerConfig
 from tests.tracking.clips import waving
 
 CASE = Case("transformer", 0, 2, 8, 4, 5e-4, 4000, "mujoco")

@@ -15,7 +15,7 @@ from bumblebee.motion.kinematics import lowest, make_clip
 from bumblebee.robot.facts import stand_pose
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.feed_forward import static_torques
-from bumblebee.tracking.terms import parts
+from bumblebee.tracking.observing.terms import parts
 
 STILL = make_library(EmbeddedConfig(limit=1))[0]
 

@@ -9,10 +9,10 @@ import pytest
 
 from benchmarks.measured_loop import work
 from benchmarks.measured_loop.__main__ import parse, run
-from bumblebee.deploy.episodes import Episode
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion.clip import Clip
+from bumblebee.policy.episodes import Episode
 from tests.learning.swaying import ANKLES, record, weakened
 from tests.tracking.clips import waving
 

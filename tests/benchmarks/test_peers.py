@@ -4,7 +4,7 @@ from pathlib import Path
 
 from benchmarks.motion_pack import write_pack
 from benchmarks.peers import clips_of
-from tests.benchmarks.test_baselines import pieces
+from tests.benchmarks.baselines.test_baselines import pieces
 
 
 def test_motions_are_chosen_by_split_and_name_and_wholes_need_all_their_pieces(tmp_path: Path):

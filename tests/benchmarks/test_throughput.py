@@ -19,7 +19,7 @@ from bumblebee.learning.ranks import Ranks
 from bumblebee.sim.effects import single
 from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.config import EnvConfig, Randomisation
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 from tests.tracking.clips import waving
 
 CLIPS = [waving("a", 60), waving("b", 90)]

@@ -32,13 +32,15 @@ GROUND = {"config", "budget"}  # modules that every room may import
 # Module-level numbers that decide nothing: what they are stands beside them.
 NO_THRESHOLDS = {
     "simulation/cache.py": {"_KEPT_BYTES"},  # memory
-    "simulation/first_order.py": {"_FORGOTTEN"},  # rounding
+    "simulation/starts/first_order.py": {"_FORGOTTEN"},  # rounding
     "simulation/roll.py": {"_KEPT_BYTES"},  # memory
-    "simulation/setpoints.py": {"_BYTES"},  # memory
-    "simulation/simulate.py": {"_MOST_THREADS", "_CHUNK_BYTES", "_KEPT"},  # threads and memory
+    "simulation/starts/setpoints.py": {"_BYTES"},  # memory
+    "simulation/batches.py": {"_MOST_THREADS"},  # threads
+    "simulation/inputs.py": {"_KEPT"},  # memory
+    "simulation/simulate.py": {"_CHUNK_BYTES"},  # memory
     "simulation/units.py": {"MEASURES"},  # factors of units
     "plan/rehearsal.py": {"_BEFORE", "_TOGETHER"},  # rows of padding, memory
-    "plan/drawing.py": {"_PANELS"},  # what fits a page
+    "plan/written/drawing.py": {"_PANELS"},  # what fits a page
     "residuals/problem.py": {"_GROUP"},  # memory
     # halved and doubled they move nothing on the fixed sample: docs/decisions/threshold-day.md
     "dataset/smoothing.py": {"_NEIGHBOURS"},
@@ -53,7 +55,7 @@ NO_THRESHOLDS = {
     "residuals/nuisances.py": {"_LEAST_ARMATURE"},
     "selection/proposals/gain_grid.py": {"_LEAST_FACTOR"},
     "simulation/actuators.py": {"_FEEDBACK"},
-    "simulation/hidden_states.py": {"_LEAD_ERROR"},
+    "simulation/starts/hidden_states.py": {"_LEAD_ERROR"},
     "simulation/windows.py": {"_LEAD_SHARE", "_BRIEF"},
     "selection/proposals/loss_likelihoods.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile
 }

@@ -23,9 +23,11 @@ import pytest
 import yaml
 
 from bumblebee.learning.learner import CHECKPOINT
-from flows import demo, login, servers
+from flows import demo
 from flows import workspace as workspaces
 from flows.environment import environment
+from flows.people import login
+from flows.servers import servers
 from flows.stages import changed_stages, read_stages
 from tasks import registry
 

@@ -13,7 +13,7 @@ HOME = Path(__file__).parents[2]
 LOOK = """
 import json, sys
 import numpy as np
-from bumblebee.deploy.compensation_plan import compensate
+from bumblebee.compensation.plan import compensate
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.sim.effects import CATALOGUE, single
 from tests.diagnosis import arm
@@ -32,10 +32,10 @@ SEALED = """
 import sys
 from types import SimpleNamespace
 import numpy as np
-import bumblebee.deploy.undeclared as room
+import bumblebee.stand_in.undeclared as room
 room.__path__.append(sys.argv[1])
-from bumblebee.deploy.stand_in_effects import declared_g1, entry, to_laws
-from bumblebee.deploy.undeclared.kinds import KINDS, LATER, Place
+from bumblebee.stand_in.sealed import declared_g1, entry, to_laws
+from bumblebee.stand_in.undeclared.kinds import KINDS, LATER, Place
 
 kind = KINDS["hose_pull"]
 assert LATER[-1] is kind
@@ -127,6 +127,6 @@ def test_a_package_that_cannot_be_imported_is_named_in_one_line(package: Path) -
 
 
 def test_its_law_in_the_stand_in_is_found_and_sealed(tmp_path: Path) -> None:
-    (tmp_path / "hose_pull.py").write_text(blocks()["bumblebee/deploy/undeclared/hose_pull.py"])
+    (tmp_path / "hose_pull.py").write_text(blocks()["bumblebee/stand_in/undeclared/hose_pull.py"])
     done = run(tmp_path, "-c", SEALED, str(tmp_path))
     assert done.returncode == 0, done.stderr

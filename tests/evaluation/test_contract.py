@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bumblebee.deploy.episodes import FALL_RULE
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.contract import (
     Contract,
@@ -21,6 +20,7 @@ from bumblebee.evaluation.contract import (
 )
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import make_clip
+from bumblebee.policy.episodes import FALL_RULE
 from bumblebee.robot.facts import stand_pose
 
 

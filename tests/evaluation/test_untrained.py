@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.learning.export import write_export
-from bumblebee.tracking.library import AHEAD
-from tests.deploy.conftest import linear_onnx
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.tracking.sampling.library import AHEAD
+from tests.policy.conftest import linear_onnx
 
 
 def test_weights_are_drawn_anew_and_the_rest_stays(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from bumblebee.errors import BadInput
 from flows import owned
 from flows import workspace as workspaces
-from tasks.private import INDEX
+from tasks.lab.private import INDEX
 
 NOBODY = 65534
 

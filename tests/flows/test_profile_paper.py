@@ -18,8 +18,8 @@ from bumblebee.tracking.rewards import PAPER_SHARPNESS, PAPER_WEIGHTS
 from flows.environment import environment
 from flows.stages import read_stages
 from flows.workspace import HOME, create, merge
-from tasks import params
 from tasks.sections import check_content
+from tasks.settings import params
 
 FILE = HOME / "profiles" / "paper.yaml"
 TRACKING = {

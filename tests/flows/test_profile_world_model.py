@@ -1,9 +1,9 @@
 """profiles/world_model.yaml: the demo with the other learner in the stage that trains."""
 
 from flows.workspace import HOME, merge
-from tasks import params
 from tasks.refine import RefineConfig
 from tasks.sections import check_content
+from tasks.settings import params
 
 FILE = HOME / "profiles" / "world_model.yaml"
 

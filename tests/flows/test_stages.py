@@ -9,7 +9,7 @@ from dvc.repo import Repo
 
 from bumblebee.errors import BadInput
 from flows.stages import Stage, changed_stages, downstream, in_order, read_stages, to_run
-from tasks import lock_file
+from tasks.running import lock_file
 
 
 def stage(name: str, *needs: str, command: str = "") -> Stage:

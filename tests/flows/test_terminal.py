@@ -12,7 +12,7 @@ from prefect.logging.handlers import PrefectConsoleHandler
 from bumblebee import cli
 from flows import demo, loop, terminal, walk
 from flows.environment import SERVERS
-from flows.servers import Addresses
+from flows.servers.servers import Addresses
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from prefect.logging.loggers import flow_run_logger
 
 from flows import loop as loops
 from flows.environment import SERVERS, environment
-from flows.servers import HOME, listener
+from flows.servers.servers import HOME, listener
 from flows.walk import without_server, without_trace
 
 

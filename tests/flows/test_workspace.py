@@ -9,7 +9,7 @@ from bumblebee.errors import BadInput
 from flows import demo
 from flows import workspace as workspaces
 from flows.stages import read_stages
-from tasks.params import read
+from tasks.settings.params import read
 
 
 def test_sections_merge_and_everything_else_is_replaced():

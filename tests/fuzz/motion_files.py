@@ -96,8 +96,8 @@ def policy(folder: Path, gain: float = 0.0) -> Path:
     from onnx import TensorProto, helper, numpy_helper
 
     from bumblebee.learning.export import write_export
-    from bumblebee.tracking.library import AHEAD
-    from bumblebee.tracking.observations import layout
+    from bumblebee.tracking.observing.observations import layout
+    from bumblebee.tracking.sampling.library import AHEAD
 
     size = sum(part for _, part in layout(23, len(AHEAD)))
     weight = np.full((size, 23), gain, dtype=np.float32)

@@ -12,7 +12,7 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.human.read import HumanConfig, read_human
-from bumblebee.motion.walk import motion_sources
+from bumblebee.motion.reading.walk import motion_sources
 from tests.fuzz.test_motion import damaged, each
 from tests.motion.human.people import bvh, npz, smpl
 

@@ -15,13 +15,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.motion.captions import parse_caption
 from bumblebee.motion.checks import check_clip
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.folder import ReadConfig, read_file
+from bumblebee.motion.reading.folder import ReadConfig, read_file
 from bumblebee.motion.store import read_library
+from bumblebee.policy.exported import ExportedPolicy
 from tests.fuzz.budget import SECONDS, rounds
 from tests.fuzz.motion_files import change_facts, csv, fields, library, policy, shard, table
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.folder import ReadConfig, read_folder
+from bumblebee.motion.reading.folder import ReadConfig, read_folder
 from bumblebee.motion.store import read_library
 from tests.fuzz.motion_corpus import CAPTIONS, FILES, LIBRARIES
 from tests.fuzz.motion_files import csv, library, table

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import parse_yaml
-from tasks import params, sections
+from tasks import sections
+from tasks.settings import params
 from tests.fuzz.budget import rounds
-from tests.tasks.settings import HOME, shipped
+from tests.tasks.settings.small import HOME, shipped
 
 FILE = Path("params.yaml")
 TEXT = (HOME / "params.yaml").read_text()
@@ -109,7 +110,7 @@ def scribbled(text: str, draw: random.Random) -> str:
 
 def full() -> dict[str, Any]:
     """The shipped settings with every section spelled out, so that every field can be changed."""
-    from tests.tasks.settings import classes
+    from tests.tasks.settings.small import classes
 
     def spelled(value: Any) -> Any:
         if type(value) in known:

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
+from bumblebee.policy.exported import ExportedPolicy
 from tests.fuzz.motion_files import policy
 from tests.fuzz.policy_corpus import POLICIES, stated
 

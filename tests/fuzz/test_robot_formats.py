@@ -13,7 +13,7 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.read import RobotConfig, is_robot_npz, read_robot
 from bumblebee.motion.formats.write import mjlab_npz
-from bumblebee.motion.usable import usable
+from bumblebee.motion.reading.usable import usable
 from bumblebee.robot.facts import joint_names
 from tests.fuzz.budget import rounds
 from tests.fuzz.motion_files import clip, fields, table

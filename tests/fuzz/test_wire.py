@@ -6,9 +6,9 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.wire.journal import read_journal
-from bumblebee.wire.lcm_codec import Codec, decode_card, encode_card
-from bumblebee.wire.limits import Limits, read_limits
+from bumblebee.wire.links.lcm_codec import Codec, decode_card, encode_card
 from bumblebee.wire.rollouts import rollout_of
+from bumblebee.wire.safety.limits import Limits, read_limits
 from tests.fuzz.budget import rounds
 from tests.fuzz.test_overrule import damaged
 from tests.wire.made import card, order, state

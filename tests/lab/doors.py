@@ -19,9 +19,11 @@ from urllib.parse import urlsplit
 
 import yaml
 
-from flows import people, runs, servers
+from flows import runs
 from flows.environment import SERVERS
-from tests.flows.test_pages import LIMIT, Served, make
+from flows.people import accounts as people
+from flows.servers import servers
+from tests.flows.servers.test_pages import LIMIT, Served, make
 from tests.lab import machines
 
 DOCS = Path(__file__).parents[2] / "docs" / "lab.md"
@@ -137,7 +139,7 @@ def serving(folder: Path) -> Iterator[tuple[servers.Addresses, "subprocess.Popen
     """`make serve` in a workspace, until the block ends."""
     known = {name: value for name, value in os.environ.items() if not name.startswith(("PREFECT_API", "MLFLOW_TR"))}
     process = subprocess.Popen(
-        [sys.executable, "-m", "flows.serve"],
+        [sys.executable, "-m", "flows.servers.serve"],
         cwd=folder,
         env={**known, "PYTHONPATH": str(servers.HOME)},
         stdout=subprocess.PIPE,

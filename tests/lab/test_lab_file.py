@@ -7,8 +7,8 @@ import yaml
 
 from bumblebee.errors import BadInput
 from flows.environment import environment
-from tasks.lab import read_lab
-from tasks.lab_checks import revisions
+from tasks.lab.checks import revisions
+from tasks.lab.servers import read_lab
 
 GOOD = {
     "prefect": {"database": "postgresql://bumblebee@db.lab:5433/prefect"},

@@ -16,10 +16,10 @@ import psutil
 import pytest
 
 from bumblebee.measured import gate, gate_record
-from flows import login
 from flows.environment import SERVERS
-from flows.servers import HOME, Addresses
-from tests.flows.test_pages import LIMIT, Served
+from flows.people import login
+from flows.servers.servers import HOME, Addresses
+from tests.flows.servers.test_pages import LIMIT, Served
 from tests.lab import machines
 from tests.lab.conftest import LabOnThisMachine
 from tests.lab.doors import serving, with_gate

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from bumblebee.measured import gate
-from flows import people
 from flows.environment import SERVERS
-from tasks.lab import Lab, MlflowLab, PrefectLab
-from tasks.lab_checks import check_lab
-from tests.flows.test_pages import CHROMIUM, asks_not_yet
+from flows.people import accounts as people
+from tasks.lab.checks import check_lab
+from tasks.lab.servers import Lab, MlflowLab, PrefectLab
+from tests.flows.servers.test_pages import CHROMIUM, asks_not_yet
 from tests.lab import doors
 from tests.lab.conftest import LabOnThisMachine
 from tests.lab.doors import Doors, first_answer
@@ -113,7 +113,7 @@ def test_without_the_database_a_stage_logs_and_a_policy_is_fetched_through_the_s
     run = done.stdout.split()[0]
     found = json.loads(served.answer(f"{served.mlflow}/api/2.0/mlflow/runs/get?run_id={run}", "carl")[1])["run"]
     assert {"key": "cluster", "value": "c0"} in found["data"]["tags"]
-    fetch = "import sys; from tasks.fetch import main; sys.exit(main(sys.argv[1:]))"
+    fetch = "import sys; from tasks.policies.fetch import main; sys.exit(main(sys.argv[1:]))"
     options = ["of-a-laptop@champion", "--out", str(tmp_path / "fetched"), "--server", served.mlflow]
     (tmp_path / "elsewhere").mkdir()
     done = served.program("carl", fetch, tmp_path / "elsewhere", *options)

@@ -19,7 +19,7 @@ import psutil
 import pytest
 import yaml
 
-from flows.checkpoints import FOLDER
+from flows.cluster.checkpoints import FOLDER
 from flows.environment import environment
 from tests.lab import cluster as clusters
 from tests.lab import machines
@@ -82,7 +82,7 @@ def test_memory_that_no_machine_has_is_one_line(stand: Stand, tmp_path: Path) ->
 )
 def test_other_versions_on_the_cluster_are_one_line(stand: Stand, tmp_path: Path, change: str, line: str) -> None:
     made = workspace(tmp_path, stand.content)
-    ended = call(made, "-c", f"{change}\nimport sys\nfrom flows.ray_cluster import main\nsys.exit(main([]))")
+    ended = call(made, "-c", f"{change}\nimport sys\nfrom flows.cluster.ray_cluster import main\nsys.exit(main([]))")
     assert ended.returncode == 2 and line in ended.stderr and len(ended.stderr.splitlines()) == 1, ended.stderr
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 import pytest
 
-from flows.checkpoints import FOLDER
+from flows.cluster.checkpoints import FOLDER
 from flows.environment import environment
 from tests.lab.conftest import LabOnThisMachine, Stand
 from tests.lab.loops import LIMIT, call, colleague, files, locked, only, workspace

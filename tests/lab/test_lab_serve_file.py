@@ -11,11 +11,12 @@ import pytest
 import yaml
 
 from bumblebee.errors import BadInput
-from flows import people, servers
 from flows.environment import SERVERS
-from flows.lab_cli import app
-from tasks.lab import read_lab
-from tasks.lab_serve import ServeLab, read_serve, read_tracking, tls
+from flows.people import accounts as people
+from flows.people.lab_cli import app
+from flows.servers import servers
+from tasks.lab.serve import ServeLab, read_serve, read_tracking, tls
+from tasks.lab.servers import read_lab
 from tests.lab.doors import certificate, opened
 from tests.lab.machines import free_port
 
@@ -120,7 +121,7 @@ def test_stages_log_to_an_encrypted_server_alone(tmp_path: Path, content: dict[s
 def serve(folder: Path) -> subprocess.CompletedProcess[str]:
     """`make serve` in a workspace that cannot be served."""
     environment = {**os.environ, "PYTHONPATH": str(servers.HOME)}
-    command = [sys.executable, "-m", "flows.serve"]
+    command = [sys.executable, "-m", "flows.servers.serve"]
     return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=120
     )

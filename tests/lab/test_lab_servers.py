@@ -13,12 +13,12 @@ import pytest
 import yaml
 
 from bumblebee.errors import BadInput
-from flows import login
 from flows.environment import SERVERS
+from flows.people import login
 from flows.runs import ask, clear_lost
-from flows.servers import servers
-from tasks.lab import read_lab
-from tasks.lab_checks import check_lab, s3_client
+from flows.servers.servers import servers
+from tasks.lab.checks import check_lab, s3_client
+from tasks.lab.servers import read_lab
 from tests.lab import machines
 from tests.lab.conftest import LabOnThisMachine
 

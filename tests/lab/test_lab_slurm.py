@@ -85,7 +85,7 @@ def test_head_and_workers_get_the_jobs_token_and_the_loop_the_address(job: Job) 
     assert job.said("ray") == [head, *[f"{start} --address=10.0.0.1:7000"] * 2]
     (srun,) = job.said("srun")
     assert "--nodes=2 --ntasks=2 --ntasks-per-node=1 --exclude=node1" in srun
-    assert job.said("waited")[-1] == "-m flows.ray_cluster --wait 10.0.0.1:7000 3"
+    assert job.said("waited")[-1] == "-m flows.cluster.ray_cluster --wait 10.0.0.1:7000 3"
     assert not list((job.folder / "home" / ".ray").iterdir())
 
 

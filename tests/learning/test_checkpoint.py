@@ -12,7 +12,7 @@ import torch
 from bumblebee.errors import BadInput
 from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
 from bumblebee.learning.learner import CHECKPOINT
-from tests.learning.test_ppo import model, trainer  # noqa: F401
+from tests.learning.ppo.test_ppo import model, trainer  # noqa: F401
 
 
 class Hostile:

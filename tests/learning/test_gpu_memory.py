@@ -13,7 +13,7 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.gpu_memory import Needs, ppo_needs
 from bumblebee.learning.learner import Learner
 from bumblebee.learning.learners import Config, make_learner
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.learning.world_model.gpu_memory import world_model_needs
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig

@@ -14,8 +14,8 @@ from bumblebee.learning.policy import Policy, Shape, load_policy, new_actor
 from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
 from bumblebee.robot.facts import joint_names
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.library import AHEAD
-from bumblebee.tracking.observations import layout
+from bumblebee.tracking.observing.observations import layout
+from bumblebee.tracking.sampling.library import AHEAD
 from tests.tracking.clips import waving
 
 SIZE = sum(size for _, size in layout(23, len(AHEAD)))

@@ -5,16 +5,16 @@ from pathlib import Path
 import pytest
 import torch
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning import pretrained
 from bumblebee.learning.export import export_shipped
 from bumblebee.learning.policy import FILE, load_policy
 from bumblebee.learning.trial import World, try_policy
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
-from bumblebee.tracking.needs import needed
-from bumblebee.tracking.terms import expanded, parts
+from bumblebee.tracking.observing.needs import needed
+from bumblebee.tracking.observing.terms import expanded, parts
 
 
 @pytest.mark.parametrize("folder", pretrained.NAMES, ids=lambda folder: folder.name)

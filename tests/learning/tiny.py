@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from bumblebee.learning.teacher_student import make_env
+from bumblebee.learning.generalist.teacher_student import make_env
 from bumblebee.motion.clip import Clip
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv

@@ -10,13 +10,13 @@ from pathlib import Path
 import torch
 
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.learning.ranks import Ranks, join, leave
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampling.library import MotionLibrary
 from tests.tracking.clips import waving
 
 CONFIG = PpoConfig(iterations=3, steps=4, epochs=2, mini_batches=2, hidden=(16, 16), checkpoint_every=2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.usable import usable
+from bumblebee.motion.reading.usable import usable
 from bumblebee.robot.facts import joint_names
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.convert import KINDS, ConvertConfig, convert
+from bumblebee.motion.formats.convert import KINDS, ConvertConfig, convert
 from bumblebee.motion.formats.read import read_robot
-from bumblebee.motion.licence_table import LICENCES
-from bumblebee.motion.one_file import FileConfig
+from bumblebee.motion.licences.table import LICENCES
+from bumblebee.motion.reading.one_file import FileConfig
 from bumblebee.motion.store import read_library
 from tests.motion.human.people import bvh
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee.motion.licence_terms import counted, noncommercial, restrictions
-from bumblebee.motion.licences import licence_of, stated_rate
-from bumblebee.motion.walk import motion_sources
+from bumblebee.motion.licences.of_files import licence_of, stated_rate
+from bumblebee.motion.licences.terms import counted, noncommercial, restrictions
+from bumblebee.motion.reading.walk import motion_sources
 
 
 @pytest.mark.parametrize(

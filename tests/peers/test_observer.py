@@ -11,7 +11,7 @@ from bumblebee.peers.contract import read_contract
 from bumblebee.peers.observer import Observer
 from bumblebee.peers.terms import TERMS, Seen
 from bumblebee.sim.rotations import from_rotation_vector, multiply
-from tests.baselines.steps import reference, state
+from tests.benchmarks.others.steps import reference, state
 from tests.peers.peer import ANKLE, JOINTS, WIDTH, write_contract
 
 N, J, STEPS = 2, 29, 4

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 import torch
 
+from benchmarks.baselines.others.follow import follow
 from bumblebee import cli
-from bumblebee.baselines.trial import follow
 from bumblebee.learning import pretrained
 from bumblebee.learning.policy import load_policy
 from bumblebee.learning.rollout import Manner, Tick
@@ -26,11 +26,11 @@ from bumblebee.robot.model import gains
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.rotations import multiply, rotate
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.library import MotionLibrary
-from tests.baselines.steps import reference, state, turn_z
-from tests.deploy.conftest import nod
+from bumblebee.tracking.sampling.library import MotionLibrary
+from tests.benchmarks.others.steps import reference, state, turn_z
 from tests.peers.peer import JOINTS, write_contract, write_onnx
 from tests.peers.test_contract import TWIST2
+from tests.policy.conftest import nod
 
 FACTS = {"physics_hz": 500, "effort_limit": [60.0] * 29, "armature": [0.02] * 29, "floor_friction": 0.8}
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import pandas as pd
 
-from bumblebee.report.clusters_section import clusters_section
-from bumblebee.report.data_sections import motions_section
-from bumblebee.report.loop_picture import Box, loop_picture
-from bumblebee.report.opening import headline, opening
+from bumblebee.report.charts.loop_picture import Box, loop_picture
 from bumblebee.report.page import Block, Section, render
-from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.results import LoopResults, RoundResults
-from bumblebee.report.round_sections import round_section
+from bumblebee.report.sections.clusters_section import clusters_section
+from bumblebee.report.sections.data_sections import motions_section
+from bumblebee.report.sections.opening import headline, opening
+from bumblebee.report.sections.policy_sections import registry_section, success_section, training_section
+from bumblebee.report.sections.round_sections import round_section
 
 RATES = {"untrained": 0.0, "base": 0.6, "experts-r0": 0.7, "experts-r1": 0.8, "generalist": 0.9}
 TRUTH = {"effect": "coulomb_friction", "where": ["left_knee_joint"], "parameters": {"frictionloss": 1.2}, "unit": "N m"}

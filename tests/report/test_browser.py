@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bumblebee.report.filmstrip import sheet
+from bumblebee.report.films.filmstrip import sheet
 from bumblebee.report.page import Section, film, heading
 from tests.report.made import TRUTH, found, page, page_of, won_back
 

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from bumblebee.measured.rollout import Rollout
-from bumblebee.report import filmstrip
-from bumblebee.report.film_choice import Choice, won_back
+from bumblebee.report.films import filmstrip
+from bumblebee.report.films.film_choice import Choice, won_back
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.robot.model import build_spec
 

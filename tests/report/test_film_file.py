@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.report.film_file import require_film, write_film
-from bumblebee.report.replay import GHOST, Drawn, side_by_side
-from bumblebee.report.replay_still import film_frames
+from bumblebee.report.films.film_file import require_film, write_film
+from bumblebee.report.replays.replay import GHOST, Drawn, side_by_side
+from bumblebee.report.replays.replay_still import film_frames
 from tests.report.test_replay import take
 
 FRAMES = np.arange(3, dtype=np.uint8)[:, None, None, None] * np.full((1, 4, 6, 3), 80, np.uint8)

@@ -4,7 +4,7 @@ import pytest
 
 from bumblebee.report import noise_floor
 from bumblebee.report.held_out import error_line
-from bumblebee.report.opening import opening_lines
+from bumblebee.report.sections.opening import opening_lines
 from tests.report.made import TRUTH, block, found, loop_results
 
 FLOOR = {"value": 4.39, "ci95": [3.0, 5.0]}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.report.looks import MESHES, VISUAL, dress, is_g1, loft, meshes_of_user
+from bumblebee.report.films.looks import MESHES, VISUAL, dress, is_g1, loft, meshes_of_user
 from bumblebee.robot.model import build_model, build_spec
 
 

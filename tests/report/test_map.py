@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from bumblebee.clustering.map import STEP, form, written
-from bumblebee.report.clusters_section import clusters_section
-from bumblebee.report.motion_map import rows
+from bumblebee.report.charts.motion_map import rows
 from bumblebee.report.page import policy, render
+from bumblebee.report.sections.clusters_section import clusters_section
 from tests.report.made import TRUTH, found, loop_results
 
 NASTY = "<script>document.title='owned'</script>\t\"&\n"

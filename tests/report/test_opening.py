@@ -5,12 +5,12 @@ from typing import Any
 
 import pytest
 
-from bumblebee.report.compensation import compensation_line, compensation_table
 from bumblebee.report.effect_words import sealed_size
-from bumblebee.report.opening import headline, opening, opening_lines
 from bumblebee.report.page import Block
 from bumblebee.report.results import LoopResults
-from bumblebee.report.success_steps import step_differences, success_steps
+from bumblebee.report.sections.compensation import compensation_line, compensation_table
+from bumblebee.report.sections.opening import headline, opening, opening_lines
+from bumblebee.report.sections.success_steps import step_differences, success_steps
 from bumblebee.report.truth import match
 from tests.report.made import DELAY, LAW, PLAN, TRUTH, difference, found, page_of, won_back
 

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 
 from bumblebee.clustering.map import form
-from bumblebee.report import replay_page
-from bumblebee.report.clusters_section import clusters_section
 from bumblebee.report.page import render
-from bumblebee.report.replay import GHOST, Drawn, Part, Take, part, side_by_side
-from bumblebee.report.replay_still import panel
-from bumblebee.report.shape import coarse, shape, surfaces
-from bumblebee.report.windows import window_takes
+from bumblebee.report.replays import replay_page
+from bumblebee.report.replays.replay import GHOST, Drawn, Part, Take, part, side_by_side
+from bumblebee.report.replays.replay_still import panel
+from bumblebee.report.replays.shape import coarse, shape, surfaces
+from bumblebee.report.replays.windows import window_takes
+from bumblebee.report.sections.clusters_section import clusters_section
 from bumblebee.robot.model import build_spec
 from tests.diagnosis import cart
 from tests.report.made import TRUTH, found, loop_results
@@ -111,7 +111,7 @@ def test_a_robot_without_geoms_is_drawn_as_rods_between_its_bodies() -> None:
 
 def test_large_meshes_are_made_coarser_and_keep_their_extent(monkeypatch: pytest.MonkeyPatch) -> None:
     parts = surfaces(spec().compile())
-    monkeypatch.setattr("bumblebee.report.shape._MOST_BYTES", 2000)
+    monkeypatch.setattr("bumblebee.report.replays.shape._MOST_BYTES", 2000)
     small = coarse(parts)
     assert sum(6 * len(p.points) + 12 * len(p.faces) for p in small) <= 2000
     for before, after in zip(parts, small, strict=True):

@@ -9,10 +9,10 @@ import pytest
 
 from bumblebee.evaluation.intervals import bootstrap_mean, sign_flip_test
 from bumblebee.measured.rollout import Rollout
-from bumblebee.report import filmstrip
-from bumblebee.report.loop_picture import Box, loop_picture
+from bumblebee.report.charts.loop_picture import Box, loop_picture
+from bumblebee.report.films import filmstrip
 from bumblebee.report.page import image
-from bumblebee.report.policy_sections import PRETRAINED, training_section
+from bumblebee.report.sections.policy_sections import PRETRAINED, training_section
 from bumblebee.report.truth import match
 from bumblebee.report.wording import change, effect_line, number, percent, plural, shown, signed
 from bumblebee.robot.facts import joint_names, stand_pose

@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 
 from bumblebee.report.names import everyone, label, ladder, last_policy
-from bumblebee.report.next_steps import next_steps, price
-from bumblebee.report.opening import opening, opening_lines
-from bumblebee.report.policy_sections import registry_section, success_section
 from bumblebee.report.results import LoopResults
+from bumblebee.report.sections.next_steps import next_steps, price
+from bumblebee.report.sections.opening import opening, opening_lines
+from bumblebee.report.sections.policy_sections import registry_section, success_section
 from bumblebee.report.wording import SAME_FILE, change, changes
-from tasks.params import SECTIONS
+from tasks.settings.params import SECTIONS
 from tests.report.made import TRUTH, difference, found, loop_results, won_back
 
 

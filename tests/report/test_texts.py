@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from bumblebee.report.clusters_section import clusters_section
+from bumblebee.report.sections.clusters_section import clusters_section
 from tests.report.made import TRUTH, found, index, loop_results
 
 

@@ -21,8 +21,8 @@ from bumblebee.sim.mujoco_warp import MujocoWarp
 from bumblebee.sim.sensors import add_foot_sensors, load_model
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.randomisation import randomise_worlds
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.worlds.randomisation import randomise_worlds
 from tests.tracking.clips import waving
 
 HAS_GPU = torch.cuda.is_available()

@@ -13,7 +13,7 @@ from bumblebee.sim.effects.warp_engine import EffectsWarp
 from bumblebee.sim.mujoco_warp import MujocoWarp
 from bumblebee.sim.sensors import add_foot_sensors
 from bumblebee.tracking.config import Randomisation
-from bumblebee.tracking.randomisation import randomise_worlds
+from bumblebee.tracking.worlds.randomisation import randomise_worlds
 from tests.sim.test_mujoco_warp import GPU, STAND, STEPS, WORLDS, compare, converged, started, targets
 
 TORQUES = (

@@ -15,8 +15,8 @@ from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.store import write_library
 from bumblebee.robot.facts import stand_pose
 from tasks import cluster as stage
-from tasks import paths
-from tasks.stage import run_stage
+from tasks.running import paths
+from tasks.running.stage import run_stage
 
 PARAMS = """
 clusters: [slow, quick]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bumblebee.cli import run
-from bumblebee.deploy.compensation_file import read_compensation
+from bumblebee.compensation.file import read_compensation
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect, single, write_effects
 from tasks import compensate

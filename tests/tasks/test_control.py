@@ -14,10 +14,11 @@ from bumblebee.motion.store import write_library
 from bumblebee.robot.model import write_xml
 from bumblebee.sim.effects import Effect, single, write_effects
 from bumblebee.sim.sensors import load_model
-from tasks import base, control, experts, refine, training
+from tasks import base, control, experts, refine
 from tasks.delta import Trained
-from tasks.params import load
+from tasks.policies import training
 from tasks.refine import RefineConfig
+from tasks.settings.params import load
 from tests.tracking.clips import waving
 
 TINY = {

@@ -11,16 +11,16 @@ import pytest
 import torch
 import yaml
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
-from bumblebee.learning.distill import DistillConfig
+from bumblebee.learning.generalist.distill import DistillConfig
 from bumblebee.learning.policy import Policy, Shape, load_policy, new_actor
 from bumblebee.motion.store import write_library
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.library import AHEAD
-from bumblebee.tracking.observations import layout
+from bumblebee.tracking.observing.observations import layout
+from bumblebee.tracking.sampling.library import AHEAD
 from tasks import distill
 from tests.tracking.clips import waving
 

@@ -12,14 +12,14 @@ import yaml
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.filter import DROP_COLUMNS
+from bumblebee.motion.filters.rules import DROP_COLUMNS
 from bumblebee.motion.kinematics import lowest, make_clip
 from bumblebee.motion.store import read_library, write_library, writer
 from bumblebee.robot.facts import stand_pose
 from tasks import filter as stage
-from tasks import paths
-from tasks.policy_filter import PolicyFilter
-from tasks.stage import run_stage
+from tasks.policies.policy_filter import PolicyFilter
+from tasks.running import paths
+from tasks.running.stage import run_stage
 
 
 @pytest.fixture(autouse=True)

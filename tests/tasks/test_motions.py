@@ -8,11 +8,11 @@ import pandas as pd
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.folder import Reading, noted_table, skipped_table
+from bumblebee.motion.reading.folder import Reading, noted_table, skipped_table
 from bumblebee.motion.store import read_index, read_library, writer
 from bumblebee.robot.facts import stand_pose
 from tasks import motions
-from tasks.stage import run_stage
+from tasks.running.stage import run_stage
 
 
 @pytest.fixture(autouse=True)

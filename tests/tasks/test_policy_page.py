@@ -11,15 +11,16 @@ import pytest
 import yaml
 
 from bumblebee import cli
-from bumblebee.deploy.compensation_file import write_compensation
-from bumblebee.deploy.compensation_plan import compensate
-from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.compensation.file import write_compensation
+from bumblebee.compensation.plan import compensate
 from bumblebee.errors import EXIT_BAD_INPUT
 from bumblebee.motion.store import write_library
-from tasks import fetch, registry
+from bumblebee.policy.exported import ExportedPolicy
+from tasks import registry
+from tasks.policies import fetch
 from tasks.registry.models import _policy_files
-from tests.deploy.conftest import nod, policy_folder
-from tests.test_commands import run
+from tests.commands.test_commands import run
+from tests.policy.conftest import nod, policy_folder
 
 PAGE = Path(__file__).parents[2] / "docs" / "policy.md"
 CARD = "# expert-c0\n\nFollows a reference motion.\n"
@@ -127,7 +128,7 @@ def test_a_champion_is_deployed_by_its_name_as_far_as_the_robot(
     workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     """It is fetched, its contract read, and the wire looked at, where nobody is; from any folder, nothing is left."""
-    monkeypatch.setattr("bumblebee.wire.preflight._PATIENCE", 0.05)
+    monkeypatch.setattr("bumblebee.wire.safety.preflight._PATIENCE", 0.05)
     monkeypatch.chdir(tmp_path)
     words = ["deploy", "run", "expert-c0@champion", "--workspace", str(workspace), "--clip", "squat", "--unattended"]
     assert run(*words, "--at", tmp_path / "w") == EXIT_BAD_INPUT

@@ -10,9 +10,9 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import COLUMNS, results
 from bumblebee.learning.export import write_export
-from bumblebee.tracking.library import AHEAD
+from bumblebee.tracking.sampling.library import AHEAD
 from tasks import publish
-from tests.deploy.conftest import linear_onnx
+from tests.policy.conftest import linear_onnx
 
 PARAMS = "clusters: [c0, c1]\nrounds: []\nfinal_round: 0\npublish: {}\nrollouts: {}\n"
 

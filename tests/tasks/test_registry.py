@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 import yaml
 
-from tasks import lineage, registry, run_form
+from tasks import registry
+from tasks.running import lineage, run_form
 
 
 @dataclass(frozen=True)

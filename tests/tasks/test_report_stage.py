@@ -10,11 +10,13 @@ import pytest
 
 from bumblebee.measured.rollout import Rollout, write_rollout
 from bumblebee.measured.wire_note import wire_note
-from bumblebee.report.film_choice import Choice
-from bumblebee.report.filmstrip import Film
+from bumblebee.report.films.film_choice import Choice
+from bumblebee.report.films.filmstrip import Film
 from bumblebee.report.results import RoundResults
 from bumblebee.robot.facts import joint_names, stand_pose
-from tasks import film, paths, report
+from tasks import report
+from tasks.pages import film
+from tasks.running import paths
 from tasks.sections import Loop, Round
 from tests.report.made import loop_results
 

@@ -15,10 +15,11 @@ from bumblebee.learning.export import write_export
 from bumblebee.measured.rollout import Rollout, read_dataset, read_rollout, write_rollout
 from bumblebee.measured.wire_note import noted_latency
 from bumblebee.motion.store import write_library
-from bumblebee.tracking.library import AHEAD
-from tasks import evaluate, ingest, paths, report, rollouts, seal
+from bumblebee.tracking.sampling.library import AHEAD
+from tasks import evaluate, ingest, report, rollouts, seal
+from tasks.running import paths
 from tasks.sections import Loop, Round
-from tests.deploy.conftest import linear_onnx, nod
+from tests.policy.conftest import linear_onnx, nod
 
 PARAMS = """
 clusters: [c0, c1]

@@ -7,16 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee.deploy.stand_in_effects import declared_g1, to_laws
-from bumblebee.deploy.undeclared.faults import largest, peaks
-from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, Place
 from bumblebee.errors import BadInput
 from bumblebee.report.truth import match
 from bumblebee.robot.facts import joint_names
 from bumblebee.sim.effects import CATALOGUE as EFFECTS
-from tasks import paths, seal
+from bumblebee.stand_in.sealed import declared_g1, to_laws
+from bumblebee.stand_in.undeclared.faults import largest, peaks
+from bumblebee.stand_in.undeclared.kinds import CATALOGUE, KINDS, Place
+from tasks import seal
+from tasks.on_robot.seal_trial import Trial
+from tasks.running import paths
 from tasks.seal import BODIES, OF_G1, SealConfig, draw, region
-from tasks.seal_trial import Trial
 
 
 def test_seed_and_attempt_decide_and_others_draw_otherwise() -> None:

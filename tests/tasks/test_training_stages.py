@@ -14,10 +14,12 @@ from bumblebee.learning import pretrained
 from bumblebee.learning.policy import load_policy
 from bumblebee.motion.store import write_library
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.sampler import ClipSampler
-from tasks import base, experts, params, refine, report, training
-from tasks.came_along import came_along
+from bumblebee.tracking.sampling.sampler import ClipSampler
+from tasks import base, experts, refine, report
+from tasks.policies import training
+from tasks.policies.came_along import came_along
 from tasks.sections import Loop, Round
+from tasks.settings import params
 from tests.tracking.clips import waving
 
 TINY = {

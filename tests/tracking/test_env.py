@@ -11,9 +11,9 @@ from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig, ObservationConfig, Randomisation
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import action_scale, layout
-from bumblebee.tracking.randomisation import randomise_worlds
+from bumblebee.tracking.observing.observations import action_scale, layout
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.worlds.randomisation import randomise_worlds
 from tests.tracking.clips import waving
 
 CONFIG = EnvConfig(num_worlds=6, threads=1)

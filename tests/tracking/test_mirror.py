@@ -9,7 +9,7 @@ import torch
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.robot.facts import FEET, KEY_BODIES, joint_names, stand_pose
 from bumblebee.sim.engine import RobotState
@@ -17,14 +17,14 @@ from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
 from bumblebee.tracking.mirror import augmentation, body_reflection, joint_reflection, reflection
-from bumblebee.tracking.terms import TERMS, parts, see
+from bumblebee.tracking.observing.terms import TERMS, parts, see
+from bumblebee.tracking.sampling.library import MotionLibrary, ReferenceFrame
 from tests.tracking.clips import waving
 
 POLAR, AXIAL, QUAT = torch.tensor([1.0, -1, 1]), torch.tensor([-1.0, 1, -1]), torch.tensor([1.0, -1, 1, -1])
 B, J, A = 5, 23, 2
-OWN = [name for name, term in TERMS.items() if term.__module__ == "bumblebee.tracking.terms"]
+OWN = [name for name, term in TERMS.items() if term.__module__ == "bumblebee.tracking.observing.terms"]
 
 
 def turned(values: torch.Tensor) -> torch.Tensor:

@@ -15,9 +15,9 @@ from bumblebee.sim.mujoco_warp import MujocoWarp
 from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK, distillation_task
+from bumblebee.tracking.sampling.library import MotionLibrary
 from tests.tracking.clips import waving
 
 WORLDS, STEPS = 3, 12

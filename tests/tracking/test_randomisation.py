@@ -13,11 +13,11 @@ from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK
-from bumblebee.tracking.pushes import push_phase, regular_push
-from bumblebee.tracking.randomisation import draw_fields, randomise_worlds
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.worlds.pushes import push_phase, regular_push
+from bumblebee.tracking.worlds.randomisation import draw_fields, randomise_worlds
 from tests.tracking.clips import waving
 
 OFF = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)

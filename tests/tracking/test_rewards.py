@@ -10,8 +10,8 @@ from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import from_rotation_vector
 from bumblebee.tracking import rewards
-from bumblebee.tracking.library import ReferenceFrame
 from bumblebee.tracking.rewards import Limits, Reward, RewardConfig, Step
+from bumblebee.tracking.sampling.library import ReferenceFrame
 
 Z3, Z23, UPRIGHT = torch.zeros(1, 3), torch.zeros(1, 23), torch.tensor([[1.0, 0, 0, 0]])
 

@@ -8,9 +8,9 @@ from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.sampler import ClipSampler
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.sampling.sampler import ClipSampler
 from tests.tracking.clips import waving
 
 MASK = torch.tensor([False, True, True, False, True])

@@ -10,9 +10,9 @@ import torch
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.tracking.config import EnvConfig, Randomisation, Terrain
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.terrain import Ground, heights
+from bumblebee.tracking.sampling.library import MotionLibrary
+from bumblebee.tracking.worlds.terrain import Ground, heights
 from tests.tracking.clips import waving
 
 ROUGH = Terrain(rough=1.0, half_side=6.0)

@@ -20,7 +20,7 @@ from bumblebee.motion.clip import clip_states
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
 from bumblebee.motion.formats.write import write_motion
-from bumblebee.report.replay import GHOST, LARGEST, Drawn, side_by_side
+from bumblebee.report.replays.replay import GHOST, LARGEST, Drawn, side_by_side
 from bumblebee.robot.facts import joint_names
 from bumblebee.sim.sensors import load_model
 from bumblebee.view.drawing import drawing

@@ -6,16 +6,16 @@ from typing import Any
 
 import pytest
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning.export import export_shipped
-from bumblebee.wire.brain import Brain
-from bumblebee.wire.intake import numbers_for
-from bumblebee.wire.limits import drives_of
-from bumblebee.wire.phases import Ramps
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.wire.plan import Plan
+from bumblebee.wire.policy_end.brain import Brain
 from bumblebee.wire.rehearsal import Rehearsal
-from bumblebee.wire.robot import RobotSettings, WireRobot
-from tests.deploy.conftest import nod
+from bumblebee.wire.robot_end.robot import RobotSettings, WireRobot
+from bumblebee.wire.safety.intake import numbers_for
+from bumblebee.wire.safety.limits import drives_of
+from bumblebee.wire.safety.phases import Ramps
+from tests.policy.conftest import nod
 
 SHORT = Ramps(rise_speed=5.0, rise_least=0.6, soften=0.2, ready=0.1, blend=0.2, stand=0.04, damp=0.1)
 

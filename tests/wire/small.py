@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.wire.guard import PERIOD, Guard, Tick
-from bumblebee.wire.intake import numbers_for
 from bumblebee.wire.journal import Entry, record
-from bumblebee.wire.keys import Keys
-from bumblebee.wire.limits import Drives
 from bumblebee.wire.messages import Mode, State
-from bumblebee.wire.phases import Phase, Ramps
+from bumblebee.wire.operator.keys import Keys
 from bumblebee.wire.plan import Plan
-from bumblebee.wire.questions import Answer, Question
-from bumblebee.wire.rules import Reference, Wish
+from bumblebee.wire.policy_end.questions import Answer, Question
+from bumblebee.wire.safety.guard import PERIOD, Guard, Tick
+from bumblebee.wire.safety.intake import numbers_for
+from bumblebee.wire.safety.limits import Drives
+from bumblebee.wire.safety.phases import Phase, Ramps
+from bumblebee.wire.safety.rules import Reference, Wish
 from tests.wire.made import JOINTS, state
 
 QUICK = Ramps(rise_speed=5.0, rise_least=0.1, soften=0.05, ready=0.05, blend=0.1, stand=0.1, damp=0.1)

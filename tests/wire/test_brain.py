@@ -9,18 +9,18 @@ import pytest
 import torch
 
 from bumblebee import quaternions
-from bumblebee.deploy.compensation_plan import compensate
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.runner import reference_library
+from bumblebee.compensation.plan import compensate
 from bumblebee.motion.kinematics import forward_key_positions
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.runner import reference_library
 from bumblebee.robot.facts import joint_names, stand_pose
-from bumblebee.wire.align import aligned
-from bumblebee.wire.brain import Brain, OneClip, OneRobot
 from bumblebee.wire.messages import State, layout_of
-from bumblebee.wire.questions import Question, decode_answer, encode_answer
-from tests.deploy.conftest import nod
-from tests.deploy.conftest import policy_folder as policy_folder  # a fixture
-from tests.deploy.test_compensation import effect
+from bumblebee.wire.policy_end.align import aligned
+from bumblebee.wire.policy_end.brain import Brain, OneClip, OneRobot
+from bumblebee.wire.policy_end.questions import Question, decode_answer, encode_answer
+from tests.policy.conftest import nod
+from tests.policy.conftest import policy_folder as policy_folder  # a fixture
+from tests.policy.test_compensation import effect
 from tests.wire.made import state
 
 TURN = quaternions.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(1.1))

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee import cli_deploy
-from bumblebee.deploy.stand_in_effects import read_sealed
+from bumblebee.commands import deploy as cli_deploy
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.motion.formats.write import write_motion
-from tests.test_commands import run
+from bumblebee.stand_in.sealed import read_sealed
+from tests.commands.test_commands import run
 
 ALONE = ("--unattended", "--clip", "squat")
 
@@ -62,7 +62,7 @@ def test_a_registered_name_without_a_registry_is_one_line(capsys: pytest.Capture
 def test_without_a_robot_a_simulated_one_can_be_started_as_the_line_says(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bumblebee.wire.preflight._PATIENCE", 0.05)
+    monkeypatch.setattr("bumblebee.wire.safety.preflight._PATIENCE", 0.05)
     monkeypatch.setattr("bumblebee.wire.realtime.harden", lambda priority: [])
     said = refused(capsys, "run", "shipped", *ALONE, "--at", tmp_path / "w", "--out", tmp_path / "out")
     words = said.strip().split("bumblebee ")[-1].split()
@@ -74,8 +74,8 @@ def test_without_a_robot_a_simulated_one_can_be_started_as_the_line_says(
 def test_a_run_that_a_rule_ended_says_so_by_its_status(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bumblebee.wire.console import Ended
-    from bumblebee.wire.screen import Numbers
+    from bumblebee.wire.operator.console import Ended
+    from bumblebee.wire.operator.screen import Numbers
 
     for reason, status in (("tilt", cli_deploy.STOPPED), ("", 0)):
         ended = Ended(reason, Numbers(23), {"permitted": ["memory locked"], "refused": {}})

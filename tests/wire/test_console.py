@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from bumblebee.wire import packets
-from bumblebee.wire.console import _attend
-from bumblebee.wire.guard_process import END as END_OF_RUN
-from bumblebee.wire.guard_process import RECORD
 from bumblebee.wire.job import Job
 from bumblebee.wire.journal import Entry, Writer, record
-from bumblebee.wire.keys import END, GO, HELP, HOLD, OFF, Hand, Keys, decode_keys, encode_keys
-from bumblebee.wire.phases import Phase
-from bumblebee.wire.screen import Durations, Numbers
-from bumblebee.wire.terminal import Terminal
-from bumblebee.wire.watcher import STOP, Watcher
+from bumblebee.wire.links import packets
+from bumblebee.wire.operator.console import _attend
+from bumblebee.wire.operator.keys import END, GO, HELP, HOLD, OFF, Hand, Keys, decode_keys, encode_keys
+from bumblebee.wire.operator.screen import Durations, Numbers
+from bumblebee.wire.operator.terminal import Terminal
+from bumblebee.wire.operator.watcher import STOP, Watcher
+from bumblebee.wire.safety.guard_process import END as END_OF_RUN
+from bumblebee.wire.safety.guard_process import RECORD
+from bumblebee.wire.safety.phases import Phase
 from tests.wire.small import Small, drives, plan, small_records
 
 SECOND = 1_000_000_000

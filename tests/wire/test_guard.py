@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bumblebee.wire.guard import PERIOD
-from bumblebee.wire.limits import Limits
 from bumblebee.wire.messages import Mode
-from bumblebee.wire.phases import Phase, Ramps
-from bumblebee.wire.rules import RULES, Step, Wish, cut, torque_of
+from bumblebee.wire.safety.guard import PERIOD
+from bumblebee.wire.safety.limits import Limits
+from bumblebee.wire.safety.phases import Phase, Ramps
+from bumblebee.wire.safety.rules import RULES, Step, Wish, cut, torque_of
 from tests.wire.made import state
 from tests.wire.small import FRAMES, HOLD, Small, drives, plan
 

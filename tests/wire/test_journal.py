@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.learning.export import export_shipped
 from bumblebee.measured.intake import intake
 from bumblebee.measured.rollout import read_rollout
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.robot.facts import joint_names
 from bumblebee.robot.model import build_model
 from bumblebee.wire.clock import SECOND
 from bumblebee.wire.journal import Writer, layout, read_journal, record
-from bumblebee.wire.line import LineFaults
+from bumblebee.wire.links.line import LineFaults
 from bumblebee.wire.messages import Mode
-from bumblebee.wire.phases import Phase
 from bumblebee.wire.rehearsal import Rehearsal
 from bumblebee.wire.rollouts import asked, ended_by, latency, rollout_of
+from bumblebee.wire.safety.phases import Phase
 from bumblebee.wire.session import write_down
 from tests.wire.small import small_records
 

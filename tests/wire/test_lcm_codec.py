@@ -10,9 +10,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-import bumblebee.wire
+import bumblebee.wire.links
 from bumblebee.errors import BadInput
-from bumblebee.wire.lcm_codec import Codec, decode_card, encode_card
+from bumblebee.wire.links.lcm_codec import Codec, decode_card, encode_card
 from tests.wire.made import card, order, state
 
 GEN = shutil.which("lcm-gen", path=str(Path(sys.executable).parent))
@@ -24,7 +24,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
     if GEN is None:
         pytest.skip("no lcm-gen here: it comes with the package lcm")
     folder = tmp_path_factory.mktemp("lcm")
-    file = Path(bumblebee.wire.__file__).with_name("bumblebee_wire.lcm")
+    file = Path(bumblebee.wire.links.__file__).with_name("bumblebee_wire.lcm")
     subprocess.run([GEN, "-p", "--ppath", str(folder), str(file)], check=True)
     modules = {}
     for name in ("state_t", "order_t", "card_t"):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.wire.link import Link, open_link
+from bumblebee.wire.links.link import Link, open_link
 from bumblebee.wire.messages import CARD, ORDER, STATE
 
 

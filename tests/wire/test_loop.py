@@ -11,10 +11,10 @@ from bumblebee.measured.rollout import write_rollout
 from bumblebee.robot.model import write_xml
 from bumblebee.sim.effects import Effect
 from bumblebee.wire.journal import layout, record
-from bumblebee.wire.line import LineFaults
+from bumblebee.wire.links.line import LineFaults
 from bumblebee.wire.rehearsal import Rehearsal
 from bumblebee.wire.rollouts import latency, rollout_of
-from tests.deploy.test_stand_in_robots import effect
+from tests.policy.test_stand_in_robots import effect
 from tests.wire.test_journal import G1
 
 KNEE = "left_knee_joint"

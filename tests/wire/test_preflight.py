@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
+from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.wire.clock import Clock
-from bumblebee.wire.intake import numbers_for
-from bumblebee.wire.lcm_codec import Codec, encode_card
-from bumblebee.wire.limits import Limits, drives_of, read_limits
-from bumblebee.wire.link import Link, open_link
+from bumblebee.wire.links.lcm_codec import Codec, encode_card
+from bumblebee.wire.links.link import Link, open_link
 from bumblebee.wire.messages import CARD, ORDER, STATE, Card, State, layout_of
-from bumblebee.wire.preflight import Wanted, check, meet
-from bumblebee.wire.robot import RobotSettings, WireRobot
-from tests.deploy.conftest import nod
+from bumblebee.wire.robot_end.robot import RobotSettings, WireRobot
+from bumblebee.wire.safety.intake import numbers_for
+from bumblebee.wire.safety.limits import Limits, drives_of, read_limits
+from bumblebee.wire.safety.preflight import Wanted, check, meet
+from tests.policy.conftest import nod
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ def links(tmp_path: Path) -> Iterator[tuple[Link, Link]]:
 def test_nobody_two_robots_or_another_version_on_the_wire(
     links: tuple[Link, Link], there: tuple[Card, State], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bumblebee.wire.preflight._PATIENCE", 0.05)
+    monkeypatch.setattr("bumblebee.wire.safety.preflight._PATIENCE", 0.05)
     (ours, theirs), (card, state) = links, there
     with pytest.raises(BadInput, match=r"card and states, came nothing. Start the robot.*bumblebee deploy robot"):
         meet(ours, Clock())

@@ -14,23 +14,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.learning.export import export_shipped
 from bumblebee.measured.rollout import read_rollout
-from bumblebee.wire import packets, realtime
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.wire import realtime
 from bumblebee.wire.clock import Clock
-from bumblebee.wire.guard_process import END, RECORD
 from bumblebee.wire.job import Job, decode_job, encode_job
 from bumblebee.wire.journal import read_journal
-from bumblebee.wire.keys import Keys, encode_keys
-from bumblebee.wire.lcm_codec import Codec
-from bumblebee.wire.limits import Limits
-from bumblebee.wire.link import open_link
+from bumblebee.wire.links import packets
+from bumblebee.wire.links.lcm_codec import Codec
+from bumblebee.wire.links.link import open_link
 from bumblebee.wire.messages import ORDER, STATE, Mode, Order
-from bumblebee.wire.phases import Phase
-from bumblebee.wire.policy_process import serve
-from bumblebee.wire.questions import (
+from bumblebee.wire.operator.keys import Keys, encode_keys
+from bumblebee.wire.policy_end.policy_process import serve
+from bumblebee.wire.policy_end.questions import (
     Answer,
     Question,
     decode_answer,
@@ -38,11 +36,14 @@ from bumblebee.wire.questions import (
     encode_answer,
     encode_question,
 )
-from bumblebee.wire.robot import RobotSettings, WireRobot
-from bumblebee.wire.robot_process import require_alone
+from bumblebee.wire.robot_end.robot import RobotSettings, WireRobot
+from bumblebee.wire.robot_end.robot_process import require_alone
 from bumblebee.wire.rollouts import ended_by
+from bumblebee.wire.safety.guard_process import END, RECORD
+from bumblebee.wire.safety.limits import Limits
+from bumblebee.wire.safety.phases import Phase
 from bumblebee.wire.session import Run, run
-from tests.deploy.conftest import nod
+from tests.policy.conftest import nod
 from tests.wire.conftest import SHORT
 from tests.wire.made import state
 from tests.wire.small import answer_to, drives, plan
@@ -50,7 +51,7 @@ from tests.wire.test_links import address, dds_here, lcm_here
 
 HOME = Path(__file__).parents[2]
 SLOW = 4.0
-SLOWER = 6.0  # where the robot's own deadline of 20 ms counts, which no setting makes longer
+SLOWER = 10.0  # where the robot's own deadline of 20 ms counts, which no setting makes longer
 PATIENT = Limits(
     state_hold=0.2, state_damp=0.5, policy_hold=0.2, policy_damp=0.5, deaf=2.0, console=1.0, missed=1000
 )  # a busy machine is no fault of a robot's
@@ -90,7 +91,7 @@ class Around:
         (self.console, theirs), (self.policy, worker) = packets.pair(), packets.pair()
         job = Job("sim", at, SLOW, plan(frames=10**6, limits=PATIENT), drives())
         fds = (theirs.fileno(), worker.fileno())
-        words = [sys.executable, "-m", "bumblebee.wire.guard_process", encode_job(job), *map(str, fds)]
+        words = [sys.executable, "-m", "bumblebee.wire.safety.guard_process", encode_job(job), *map(str, fds)]
         self.process = subprocess.Popen(words, pass_fds=fds, cwd=HOME, env=os.environ | {"PYTHONPATH": str(HOME)})
         theirs.close()
         worker.close()
@@ -243,7 +244,8 @@ def test_a_policy_runs_a_robot_in_another_process_and_its_log_is_a_dataset(
     if wire == "unitree":  # LowState_ has no odometry
         policy = export_shipped(tmp_path / "policy", "imu")
     code = (
-        "from bumblebee.wire.robot_process import run_robot; from bumblebee.wire.robot import RobotSettings\n"
+        "from bumblebee.wire.robot_end.robot_process import run_robot\n"
+        "from bumblebee.wire.robot_end.robot import RobotSettings\n"
         f"run_robot({wire!r}, {at!r}, [], RobotSettings(state_hz=250), {SLOWER}, 60.0, print)"
     )
     words, places = [sys.executable, "-u", "-c", code], os.pathsep.join((str(HOME), *sys.path))

@@ -9,10 +9,10 @@ import pytest
 from bumblebee.robot.facts import joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.wire.clock import SECOND
-from bumblebee.wire.lcm_codec import Codec, decode_card
-from bumblebee.wire.line import Line, LineFaults
+from bumblebee.wire.links.lcm_codec import Codec, decode_card
+from bumblebee.wire.links.line import Line, LineFaults
 from bumblebee.wire.messages import CARD, STATE, Mode, Order, State, layout_of
-from bumblebee.wire.robot import RobotSettings, WireRobot
+from bumblebee.wire.robot_end.robot import RobotSettings, WireRobot
 
 MS = SECOND // 1000
 CODEC = Codec(23)

@@ -6,23 +6,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.robots import NominalRobots
-from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.policy.robots import NominalRobots
 from bumblebee.robot.facts import stand_pose
+from bumblebee.robot.servo_command import ServoCommand
 from bumblebee.tracking.config import Randomisation
 from bumblebee.tracking.presets import PAPER_RANDOMISATION
 from bumblebee.view.sheet_page import sheet_page
-from bumblebee.wire.drawn_robots import DrawnRobots
-from bumblebee.wire.limits import Limits, drives_of
-from bumblebee.wire.rules import RULES, Moment, Step, Wish
-from bumblebee.wire.sheet import Sheet, make_sheet
-from bumblebee.wire.sheet_file import NAME, as_json, before_run, read_sheet
-from bumblebee.wire.uses import Measured, uses
-from tests.deploy.conftest import nod
-from tests.test_commands import run
+from bumblebee.wire.operator.sheet import Sheet, make_sheet
+from bumblebee.wire.operator.sheet_file import NAME, as_json, before_run, read_sheet
+from bumblebee.wire.robot_end.drawn_robots import DrawnRobots
+from bumblebee.wire.safety.limits import Limits, drives_of
+from bumblebee.wire.safety.rules import RULES, Moment, Step, Wish
+from bumblebee.wire.safety.uses import Measured, uses
+from tests.commands.test_commands import run
+from tests.policy.conftest import nod
 from tests.wire.made import state
 
 NONE = Randomisation((1.0, 1.0), gains=0.0, mass=0.0, push=0.0)

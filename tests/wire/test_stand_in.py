@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bumblebee.deploy.episodes import Episode
-from bumblebee.deploy.policy import ExportedPolicy
-from bumblebee.deploy.stand_in import Play, Work, main
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.motion.store import write_library
+from bumblebee.policy.episodes import Episode
+from bumblebee.policy.exported import ExportedPolicy
+from bumblebee.stand_in.process import Play, Work, main
 from bumblebee.tracking.terminations import Stop
-from bumblebee.wire.stand_in import over_wire
-from tests.deploy.conftest import nod
+from bumblebee.wire.robot_end.stand_in import over_wire
+from tests.policy.conftest import nod
 
 
 def play(policy: ExportedPolicy, stop: Stop = Stop(), judged: bool = False) -> Play:  # noqa: B008  (frozen)

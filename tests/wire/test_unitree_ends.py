@@ -9,12 +9,12 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joint_names
 from bumblebee.wire.clock import SECOND
-from bumblebee.wire.lcm_codec import Codec, decode_card
-from bumblebee.wire.link import open_link
+from bumblebee.wire.links.lcm_codec import Codec, decode_card
+from bumblebee.wire.links.link import open_link
+from bumblebee.wire.links.unitree_ends import ControllerEnd, RobotEnd
+from bumblebee.wire.links.unitree_hg import HELD
+from bumblebee.wire.links.unitree_link import URL, read_address
 from bumblebee.wire.messages import CARD, ORDER, STATE, Mode, Order, State, layout_of
-from bumblebee.wire.unitree_ends import ControllerEnd, RobotEnd
-from bumblebee.wire.unitree_hg import HELD
-from bumblebee.wire.unitree_link import URL, read_address
 
 CODEC, SOME = Codec(23), np.linspace(0.1, 1.0, 23).astype(np.float32).astype(float)
 WRITER, NOW = 77, 5 * SECOND

@@ -7,8 +7,8 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joint_names
+from bumblebee.wire.links.unitree_hg import HELD, LOW_CMD, LOW_STATE, MOTORS, OURS, as_cdr, checksum, command, from_cdr
 from bumblebee.wire.messages import Mode, Order, layout_of
-from bumblebee.wire.unitree_hg import HELD, LOW_CMD, LOW_STATE, MOTORS, OURS, as_cdr, checksum, command, from_cdr
 
 WRISTS = np.linspace(-0.3, 0.3, 6)
 FORMAT = "<2B2x" + "B3x5fI" * 35 + "5I"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee.wire.lcm_codec import Codec, decode_card
-from bumblebee.wire.link import Link, open_link
+from bumblebee.wire.links.lcm_codec import Codec, decode_card
+from bumblebee.wire.links.link import Link, open_link
 from bumblebee.wire.messages import CARD, ORDER, STATE, State
 from tests.wire.test_links import address, dds_here
 from tests.wire.test_unitree_ends import SOME, order, state_message

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.undeclared.sight import error_of as residual_error
-from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.sim.effects import Effect
+from bumblebee.stand_in.undeclared.declared import Declared
 
 _SHARE, _LEAST = 0.05, 0.01
 

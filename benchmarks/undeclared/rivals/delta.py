@@ -11,9 +11,9 @@ from mujoco.batch import Batch
 from benchmarks.undeclared.rivals.common import Answer
 from benchmarks.undeclared.rivals.ridge import cross_validated
 from benchmarks.undeclared.sight import error_of
-from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.simulation import difference, simulated_readings
+from bumblebee.stand_in.undeclared.declared import Declared
 
 _TICK = 0.02  # [s]
 _FEATURES = 7

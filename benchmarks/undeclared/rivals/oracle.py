@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from benchmarks.undeclared.rivals.common import Answer, error_of
-from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.deploy.undeclared.kinds import KINDS
 from bumblebee.sim.effects import CATALOGUE, Effect
+from bumblebee.stand_in.undeclared.declared import Declared
+from bumblebee.stand_in.undeclared.kinds import KINDS
 
 
 def run(robot: Declared, truth: Sequence[dict[str, Any]]) -> Answer | None:

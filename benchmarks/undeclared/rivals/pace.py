@@ -7,9 +7,9 @@ Tutorial", table 1), on parameters in units of a step. The cost is the mean squa
 import numpy as np
 
 from benchmarks.undeclared.rivals.common import Answer, Parameter, error_of, joint_parameters, named, residuals_of
-from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.sim.effects import Effect
+from bumblebee.stand_in.undeclared.declared import Declared
 
 _KINDS = ("armature", "viscous_friction", "coulomb_friction", "encoder_offset")
 _GENERATIONS = 60

@@ -12,8 +12,8 @@ from benchmarks.undeclared.rivals.common import (
     named,
     residuals_of,
 )
-from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.stand_in.undeclared.declared import Declared
 
 _PENALTIES = np.logspace(-4, 4, 17)
 _FOLDS = 5

@@ -1,12 +1,12 @@
 """The next experiment: runs within all limits that tell apart what a diagnosis could not."""
 
 from bumblebee.diagnosis.plan.config import Gain, PlanConfig
-from bumblebee.diagnosis.plan.files import claim_plan, write_plan
 from bumblebee.diagnosis.plan.findings import findings_of, read_findings
 from bumblebee.diagnosis.plan.motions import Motion
 from bumblebee.diagnosis.plan.plan import Plan, make_plan
 from bumblebee.diagnosis.plan.pool import safe_pool, set_stage
-from bumblebee.diagnosis.plan.terminal import summary
+from bumblebee.diagnosis.plan.written.files import claim_plan, write_plan
+from bumblebee.diagnosis.plan.written.terminal import summary
 
 __all__ = [
     "Gain",

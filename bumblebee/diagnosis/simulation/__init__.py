@@ -1,23 +1,14 @@
 """Simulation of a robot with given effects: the declared model varied, on windows of the logs."""
 
-from bumblebee.diagnosis.simulation.activations import activations
-from bumblebee.diagnosis.simulation.actuator_history import (
-    at_starts,
-    bent_before,
-    lagged,
-    plant_servos,
-    read_at,
-    remember,
-    state_before,
-    window_servos,
-    yielded,
-)
+from bumblebee.diagnosis.simulation.batches import own_batch, with_step
 from bumblebee.diagnosis.simulation.cache import Changes, Recall
+from bumblebee.diagnosis.simulation.chunk import Starts
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.condition_plants import make_plants
 from bumblebee.diagnosis.simulation.conditions import Condition, in_words
 from bumblebee.diagnosis.simulation.declared import declared_values, spot
 from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED, REFUSALS, effects_in_words
+from bumblebee.diagnosis.simulation.inputs import inputs_of
 from bumblebee.diagnosis.simulation.joint_path import joint_path
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
@@ -29,15 +20,20 @@ from bumblebee.diagnosis.simulation.readings import (
     smallest_moves,
 )
 from bumblebee.diagnosis.simulation.servo_damping import damping_rates
-from bumblebee.diagnosis.simulation.setpoints import begin_setpoints, setpoints_of
-from bumblebee.diagnosis.simulation.simulate import (
-    Starts,
-    at_ticks,
-    inputs_of,
-    own_batch,
-    residuals,
-    with_step,
+from bumblebee.diagnosis.simulation.simulate import at_ticks, residuals
+from bumblebee.diagnosis.simulation.starts.activations import activations
+from bumblebee.diagnosis.simulation.starts.actuator_history import (
+    at_starts,
+    bent_before,
+    lagged,
+    plant_servos,
+    read_at,
+    remember,
+    state_before,
+    window_servos,
+    yielded,
 )
+from bumblebee.diagnosis.simulation.starts.setpoints import begin_setpoints, setpoints_of
 from bumblebee.diagnosis.simulation.stop import OutOfTime, Stop, ending
 from bumblebee.diagnosis.simulation.units import (
     KINDS,

@@ -10,8 +10,8 @@ from weakref import WeakKeyDictionary
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.simulation.base_height import lowest, touches
 from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.starts.base_height import lowest, touches
 from bumblebee.diagnosis.simulation.windows import Windows
 
 _known: WeakKeyDictionary[Windows, np.ndarray] = WeakKeyDictionary()

@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 from mujoco.batch import MODEL_FIELDS, Batch
 
-from bumblebee.diagnosis.simulation.actuator_history import remember
 from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.starts.actuator_history import remember
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows
 from bumblebee.sim.effects import Memory, RuntimeHooks, StepHooks, hook_joints

@@ -10,7 +10,7 @@ import numpy as np
 from bumblebee.diagnosis.simulation.declared import spot
 from bumblebee.diagnosis.simulation.failures import REFUSALS, effects_in_words
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
-from bumblebee.diagnosis.simulation.setpoints import SetPoint, setpoints_of
+from bumblebee.diagnosis.simulation.starts.setpoints import SetPoint, setpoints_of
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import (
     CATALOGUE,

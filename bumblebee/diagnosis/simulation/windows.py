@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bumblebee.diagnosis.simulation.base_height import stance_heights
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.readings import Layout, measured_readings
+from bumblebee.diagnosis.simulation.starts.base_height import stance_heights
 from bumblebee.diagnosis.thresholds.simulation import Windowing
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout

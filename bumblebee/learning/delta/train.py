@@ -11,7 +11,7 @@ from rsl_rl.runners import OnPolicyRunner
 
 from bumblebee.learning.delta.action import DeltaAction, DeltaConfig, make_network
 from bumblebee.learning.delta.env import DeltaEnv
-from bumblebee.learning.ppo import BoundedPpo, runner_config
+from bumblebee.learning.ppo.learner import BoundedPpo, runner_config
 
 
 def train_delta(

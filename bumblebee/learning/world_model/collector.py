@@ -10,7 +10,7 @@ from bumblebee.learning.world_model.body import packed
 from bumblebee.learning.world_model.dynamics import handed_on
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.observations import middle_targets
+from bumblebee.tracking.observing.observations import middle_targets
 
 
 class Collector:

@@ -10,7 +10,7 @@ from torch import Tensor
 from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.dynamics import past_targets
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.randomisation import draw_fields
+from bumblebee.tracking.worlds.randomisation import draw_fields
 
 
 def context_in(env: TrackingEnv, ranks: Ranks | None = None) -> Tensor:

@@ -7,8 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from bumblebee.learning.ppo.update_graph import Recorded
 from bumblebee.learning.ranks import Ranks
-from bumblebee.learning.update_graph import Recorded
 
 _LOWEST = 0.1  # of the learning rate, at the end of its cosine
 

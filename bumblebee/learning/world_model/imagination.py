@@ -19,11 +19,11 @@ from bumblebee.sim.engine import RobotState
 from bumblebee.sim.servo import servos_of
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.forward_kinematics import ForwardKinematics
-from bumblebee.tracking.library import ReferenceFrame, over_robot
-from bumblebee.tracking.observations import middle_targets
+from bumblebee.tracking.observing.observations import middle_targets
+from bumblebee.tracking.observing.terms import expanded, parts, see
 from bumblebee.tracking.rewards import Step
+from bumblebee.tracking.sampling.library import ReferenceFrame, over_robot
 from bumblebee.tracking.terminations import fallen
-from bumblebee.tracking.terms import expanded, parts, see
 
 Act = Callable[[Tensor], Tensor]
 """Observations (B, D) -> actions (B, J)."""

@@ -17,7 +17,7 @@ from bumblebee.motion.describe.amass import CUT_AT_START, Key, Motions, is_smplx
 from bumblebee.motion.describe.described import ANOTHER_RATE, BEYOND, UNREADABLE, Described, Dropped, sorted_out
 from bumblebee.motion.describe.segments import Segment, index_rate, on_motion, span_of
 from bumblebee.motion.describe.text_files import TextFiles, open_texts
-from bumblebee.motion.licences import UNKNOWN, licence_of
+from bumblebee.motion.licences.of_files import UNKNOWN, licence_of
 from bumblebee.motion.texts import shown
 
 LICENCE = "MIT"

@@ -6,8 +6,8 @@ from scipy import ndimage
 from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.filters.config import FilterConfig
+from bumblebee.motion.filters.self_collision import self_penetration
 from bumblebee.motion.filters.worst import Worst, largest, longest_run, steps
-from bumblebee.motion.self_collision import self_penetration
 from bumblebee.robot.facts import KEY_BODIES, joint_names, joints
 
 

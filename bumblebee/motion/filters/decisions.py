@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from bumblebee.motion.filter import DROP_COLUMNS
 from bumblebee.motion.filters.overrule import Overrule
+from bumblebee.motion.filters.rules import DROP_COLUMNS
 
 OVERRULED = "overruled"
 """The reason of a motion that a person drops and no rule does."""

@@ -6,9 +6,9 @@ import numpy as np
 
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.filters.config import FilterConfig
+from bumblebee.motion.filters.quality import sole_speed
 from bumblebee.motion.filters.worst import Worst, longest_run
 from bumblebee.motion.kinematics import lowest_heights
-from bumblebee.motion.quality import sole_speed
 from bumblebee.motion.stance import robot_contacts
 from bumblebee.robot.facts import FEET
 

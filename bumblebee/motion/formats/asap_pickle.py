@@ -19,7 +19,7 @@ from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.layouts import arranged, layout_of, layouts, notes_of, require_joints
 from bumblebee.motion.formats.others import refuse_known
 from bumblebee.motion.raw import RawMotion, as_wxyz
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 from bumblebee.motion.texts import shown
 from bumblebee.robot.facts import joints
 

@@ -15,7 +15,7 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.layouts import layout_of, notes_of, require_joints
 from bumblebee.motion.raw import is_order
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 from bumblebee.robot.facts import joint_names
 
 _QUATERNION, _EULER = 7, 6  # columns of the root

@@ -15,7 +15,7 @@ from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.csv_header import CsvLayout, bare_layout, header_layout
 from bumblebee.motion.formats.layouts import arranged
 from bumblebee.motion.raw import RawMotion, as_wxyz
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 
 MAX_BYTES = 256 << 20  # an hour at 60 Hz has 80 MB
 _BLOCK = 10_000  # rows that are split into cells at a time

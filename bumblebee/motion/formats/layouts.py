@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 from bumblebee.robot.facts import joint_names
 
 ASAP, UNITREE = "asap", "unitree"

@@ -14,7 +14,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.layouts import arranged
 from bumblebee.motion.kinematics import forward_bodies
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 from bumblebee.robot.facts import KEY_BODIES, g1_bodies
 
 NEAR = 0.03  # m: mean distance of a file's bodies from ours; other editions of the G1's model differ by millimetres

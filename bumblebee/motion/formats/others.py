@@ -6,7 +6,7 @@ from typing import Any
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import npy_array
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 from bumblebee.motion.texts import shown
 
 _AGAIN = "Read the file that it was made from: HumanML3D's index.csv names AMASS's .npz of each."

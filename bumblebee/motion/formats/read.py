@@ -13,7 +13,7 @@ from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.formats.mjlab_npz import is_mjlab, read_mjlab_npz
 from bumblebee.motion.raw import RawMotion
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 
 PICKLES = (".pkl", ".pickle", ".joblib", ".p")
 SUFFIXES = (".csv", ".npz", *PICKLES)

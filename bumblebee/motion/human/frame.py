@@ -8,7 +8,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.motion import LANDMARKS
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "cmu": 0.0254 / 0.45}
 """Metres in a unit; `cmu` is that of CMU's files and their conversion by cgspeed (1 / 0.45 inch)."""

@@ -17,7 +17,7 @@ from bumblebee.motion.human.forward import axis_angle_positions
 from bumblebee.motion.human.npz import npz_chosen
 from bumblebee.motion.human.smpl_body import GENDERS, PARENTS, find_body
 from bumblebee.motion.rates import RATES, rate_in
-from bumblebee.motion.remedy import say
+from bumblebee.motion.reading.remedy import say
 from bumblebee.motion.texts import shown
 
 _WIDTHS = {72: "smpl", 156: "smplh", 165: "smplx"}

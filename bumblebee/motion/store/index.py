@@ -11,9 +11,10 @@ import pyarrow.parquet as pq
 
 from bumblebee.errors import BadInput
 from bumblebee.io.names import require_stem
+from bumblebee.io.whole import put
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.parquet import Kind, read_table
-from bumblebee.motion.store.place import names_shard, put
+from bumblebee.motion.store.place import names_shard
 
 FILE = "index.parquet"
 _FACTS: dict[str, Kind] = {

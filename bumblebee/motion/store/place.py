@@ -1,6 +1,5 @@
-"""Where a library keeps its files, and how one is put there."""
+"""Where a library keeps its files."""
 
-import os
 import re
 from pathlib import Path
 
@@ -20,13 +19,3 @@ def names_shard(text: str) -> bool:
 def is_shard(path: Path) -> bool:
     """Whether a file is called as shards are."""
     return path.suffix == ".parquet" and names_shard(path.stem)
-
-
-def put(path: Path, data: bytes) -> None:
-    """Write a file, whole or not at all."""
-    fresh = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        fresh.write_bytes(data)
-        os.replace(fresh, path)
-    finally:
-        fresh.unlink(missing_ok=True)

@@ -16,10 +16,11 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.io import left_overs
 from bumblebee.io.names import require_stem
+from bumblebee.io.whole import put
 from bumblebee.motion.checks import check_clips
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store.index import FILE, Row, read_places, row_of, write_index
-from bumblebee.motion.store.place import is_shard, path_of, put
+from bumblebee.motion.store.place import is_shard, path_of
 from bumblebee.motion.store.shard import (
     LEAST_CLIPS,
     MOST_CLIPS,

@@ -12,8 +12,9 @@ from bumblebee.effects.native import SUFFIX, is_hidden, physical_inertia, sloped
 from bumblebee.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS, advance
 from bumblebee.effects.terms import QUOTED, TABLE, Term, read_term
 from bumblebee.sim.effects.file import effects_yaml, read_effects, write_effects
-from bumblebee.sim.effects.forces import Memory, StepHooks, bent, history_length
+from bumblebee.sim.effects.forces import StepHooks
 from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints, runtime_hooks
+from bumblebee.sim.effects.memory import Memory, bent, history_length
 from bumblebee.sim.effects.spec import add_to_spec, in_order
 from bumblebee.sim.effects.states import State, states_of
 

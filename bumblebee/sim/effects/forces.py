@@ -20,7 +20,6 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -29,46 +28,11 @@ from mujoco.batch import Batch
 from bumblebee.effects.catalogue import CATALOGUE
 from bumblebee.effects.setpoints import advance
 from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints
+from bumblebee.sim.effects.memory import REMEMBERED, Memory, bent, history_length
 from bumblebee.sim.effects.states import states_of
 from bumblebee.sim.servo import Servos, servos_of
 
-
-@dataclass(frozen=True, eq=False)
-class Memory:
-    """Memory of n worlds at their start, where it is not what a world at rest would remember."""
-
-    time: np.ndarray
-    """(n,) [s] since the rollout began."""
-    heat: np.ndarray
-    """(n, J) [s]: integral of (torque / limit)^2."""
-    torque: np.ndarray | None = None
-    """(n, J) [N m]: state of the torque's lag."""
-    position: np.ndarray | None = None
-    """(n, L, J): readings at the steps before, the newest last."""
-    velocity: np.ndarray | None = None
-    """(n, L, J)."""
-    states: np.ndarray | None = None
-    """(n, C): those of discovered terms, see `effects.states.states_of`."""
-    bent: np.ndarray | None = None
-    """(n, H): z of Dahl's law on the H joints that have it."""
-
-
-# What is carried from step to step: saved, and on a GPU kept in place. tests/test_forgotten.py finds what is missing.
-_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent", "setpoint", "pace")
-
 _AT_REST = 0.01  # [rad/s, m/s] below which a friction of either direction goes over into the other
-
-
-def bent(z: np.ndarray, path: np.ndarray, width: float) -> np.ndarray:
-    """Dahl's z (n,) after a `path` (n,) [rad] one way: it goes to the path's sign over the `width` [rad]."""
-    way = np.sign(path)
-    return np.where(way != 0, way + (z - way) * np.exp(-np.abs(path) / width), z)
-
-
-def history_length(hooks: RuntimeHooks, step: float) -> int:
-    """L: how many steps of readings the longest encoder delay looks back."""
-    longest = float(hooks.encoder_delay.max(initial=0.0))
-    return int(np.ceil(longest / step - 1e-9)) + 1 if longest > 0 else 0
 
 
 class StepHooks:
@@ -158,11 +122,11 @@ class StepHooks:
 
     def state_dict(self) -> dict[str, np.ndarray]:
         """All that it remembers."""
-        return {name: np.copy(getattr(self, f"_{name}")) for name in _REMEMBERED}
+        return {name: np.copy(getattr(self, f"_{name}")) for name in REMEMBERED}
 
     def load_state_dict(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what `state_dict` gave."""
-        for name in _REMEMBERED:
+        for name in REMEMBERED:
             getattr(self, f"_{name}")[:] = saved[name]
 
     def _readings(self) -> tuple[np.ndarray, np.ndarray]:

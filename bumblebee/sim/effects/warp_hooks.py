@@ -14,8 +14,9 @@ from torch import Tensor
 
 from bumblebee.effects.terms import Term, _value
 from bumblebee.sim.device_arrays import DeviceArray
-from bumblebee.sim.effects.forces import _REMEMBERED, StepHooks
+from bumblebee.sim.effects.forces import StepHooks
 from bumblebee.sim.effects.hooks import RuntimeHooks
+from bumblebee.sim.effects.memory import REMEMBERED
 
 _KINDS = {"fresh": torch.bool, "time": torch.float64}  # clocks that strike on time are sums of thousands of steps
 
@@ -64,7 +65,7 @@ class WarpHooks(StepHooks):
         terms = tuple((column, coefficient, _DeviceTerm(term)) for column, coefficient, term in hooks.terms)
         super().__init__(replace(hooks, terms=terms), model, batch)  # type: ignore[arg-type]
         self.own: dict[str, Tensor] = {}
-        for name in _REMEMBERED:
+        for name in REMEMBERED:
             start = torch.as_tensor(getattr(self, f"_{name}"))
             kind = _KINDS.get(name, torch.float32)
             self.own[name] = start.to(batch.device, kind)

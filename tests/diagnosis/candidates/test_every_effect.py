@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from bumblebee.deploy.undeclared.kinds import KINDS
 from bumblebee.diagnosis.candidates.candidate import Candidate, is_simulated, shortlisted
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.candidates.exclusion import is_chosen
@@ -20,7 +19,8 @@ from bumblebee.diagnosis.simulation.variation import Variation, vary
 from bumblebee.effects.guide import page
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, StepHooks, add_to_spec, runtime_hooks
-from bumblebee.sim.effects.forces import _REMEMBERED
+from bumblebee.sim.effects.memory import REMEMBERED
+from bumblebee.stand_in.undeclared.kinds import KINDS
 from tests.diagnosis import arm, stander
 
 HOME = Path(__file__).parents[3]
@@ -29,7 +29,7 @@ NOT_SEARCHED = {
     "encoder_quantisation": "read off the logs by selection/proposals/encoder_resolution.py",
 }
 NOT_DRAWN = {
-    "surface_contact": "how low a robot comes depends on its motion: tests/diagnosis/selection/test_surface_contact.py",
+    "surface_contact": "how low a robot comes depends on its motion: test_surface_contact.py",
 }
 BESIDE_THE_MODEL = {"actuator_delay", "actuator_history"}
 
@@ -161,8 +161,8 @@ def test_what_hooks_carry_from_step_to_step_is_saved() -> None:
             hooks.apply()
             batch.step()
         changed |= {name for name, value in before.items() if not np.array_equal(value, getattr(hooks, name))}
-    forgotten = changed - {f"_{name}" for name in _REMEMBERED}
-    assert not forgotten, f"bumblebee/sim/effects/forces.py: add {sorted(forgotten)} to _REMEMBERED"
+    forgotten = changed - {f"_{name}" for name in REMEMBERED}
+    assert not forgotten, f"bumblebee/sim/effects/forces.py: add {sorted(forgotten)} to REMEMBERED"
     assert {"_time", "_heat", "_lagged", "_past_q"} <= changed
 
 
@@ -170,7 +170,7 @@ def test_what_hooks_carry_from_step_to_step_is_saved() -> None:
 def test_every_effect_has_an_equation_from_another_hand(kind: str) -> None:
     written = "".join(path.read_text() for room in ("sim", "effects") for path in (HOME / "tests" / room).glob("*.py"))
     assert f'"{kind}"' in written, f"tests/effects/test_{kind}.py: its equation, integrated in NumPy"
-    told = f"bumblebee/deploy/undeclared: a file with a law of {kind}, sharing no code, and its row in KINDS"
+    told = f"bumblebee/stand_in/undeclared: a file with a law of {kind}, sharing no code, and its row in KINDS"
     assert kind in KINDS or kind in NOT_DRAWN, told
 
 

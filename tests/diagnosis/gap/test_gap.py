@@ -16,9 +16,9 @@ from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.gap import GapPage, GapThresholds
 from bumblebee.diagnosis.thresholds.report import ExampleWindows, ReportThresholds, Verdicts
 from bumblebee.measured.rollout import write_rollout
+from tests.commands.test_cli_diagnosis import run
 from tests.diagnosis import arm, cart
 from tests.diagnosis.arm import SMALL, session_of
-from tests.test_cli_diagnosis import run
 
 SPRING = ("spring", "j2", 1.5)
 COUNT = 4

@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from bumblebee.diagnosis.plan.document import document
 from bumblebee.diagnosis.plan.predicted import pairs
-from bumblebee.diagnosis.plan.sheet import sheet
-from bumblebee.diagnosis.plan.terminal import summary
+from bumblebee.diagnosis.plan.written.document import document
+from bumblebee.diagnosis.plan.written.sheet import sheet
+from bumblebee.diagnosis.plan.written.terminal import summary
 from tests.diagnosis.plan.made import planned
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from bumblebee.diagnosis.plan import Plan, findings_of, make_plan, set_stage
 from bumblebee.diagnosis.plan.contacts import Surroundings
-from bumblebee.diagnosis.plan.document import document
 from bumblebee.diagnosis.plan.safety import made_safe, proven
+from bumblebee.diagnosis.plan.written.document import document
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect, single
 from tests.diagnosis.arm import XML, session_of, simulate

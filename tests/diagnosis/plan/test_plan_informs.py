@@ -7,8 +7,8 @@ import numpy as np
 
 from bumblebee.diagnosis.plan import findings_of, make_plan
 from bumblebee.diagnosis.plan.choose import choose
-from bumblebee.diagnosis.plan.document import document
 from bumblebee.diagnosis.plan.predicted import classes, intervals
+from bumblebee.diagnosis.plan.written.document import document
 from tests.diagnosis.arm import XML
 from tests.diagnosis.plan.made import LIMITS, planned
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.plan import PlanConfig, findings_of, make_plan, set_stage
-from bumblebee.diagnosis.plan.document import document
+from bumblebee.diagnosis.plan.written.document import document
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import single
 from tests.diagnosis.arm import XML

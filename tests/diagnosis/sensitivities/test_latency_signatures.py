@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.dataset.session import Session, make_session
-from bumblebee.diagnosis.simulation.actuator_history import mean_squares, plant_servos, read_at
+from bumblebee.diagnosis.simulation.starts.actuator_history import mean_squares, plant_servos, read_at
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from tests.diagnosis import arm
 

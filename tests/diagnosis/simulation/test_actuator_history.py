@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.dataset.session import Session, make_session
-from bumblebee.diagnosis.simulation.actuator_history import bent_before, yielded
 from bumblebee.diagnosis.simulation.joint_path import joint_path
+from bumblebee.diagnosis.simulation.starts.actuator_history import bent_before, yielded
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from tests.diagnosis import arm
 

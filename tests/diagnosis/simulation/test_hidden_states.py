@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.simulation.actuator_history import heated
+from bumblebee.diagnosis.simulation.starts.actuator_history import heated
 from bumblebee.diagnosis.thresholds.simulation import ActuatorHistory
 
 RULE = ActuatorHistory()

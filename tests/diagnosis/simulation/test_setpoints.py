@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.simulation.setpoints import (
+from bumblebee.diagnosis.simulation.inputs import inputs_of
+from bumblebee.diagnosis.simulation.starts.setpoints import (
     _at_first_command,
     _filtered,
     _followed,
@@ -13,7 +14,6 @@ from bumblebee.diagnosis.simulation.setpoints import (
     begin_setpoints,
     setpoints_of,
 )
-from bumblebee.diagnosis.simulation.simulate import inputs_of
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.sim.effects import Effect, advance, single

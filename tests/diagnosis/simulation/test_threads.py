@@ -9,15 +9,16 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from bumblebee.diagnosis import diagnose
 from bumblebee.diagnosis.dataset.session import make_session
-from bumblebee.diagnosis.simulation import roll, simulate
-from bumblebee.diagnosis.simulation.simulate import residuals, threads
+from bumblebee.diagnosis.simulation import batches, roll
+from bumblebee.diagnosis.simulation.batches import threads
+from bumblebee.diagnosis.simulation.simulate import residuals
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from tests.diagnosis import arm
 
 
 def test_as_many_threads_as_processors_that_the_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate, "THREADS", None)
+    monkeypatch.setattr(batches, "THREADS", None)
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0, 3, 5}, raising=False)
     assert threads() == 3
@@ -28,13 +29,13 @@ def test_as_many_threads_as_processors_that_the_process_may_use(monkeypatch: pyt
 
 
 def test_no_more_threads_than_pay(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate, "THREADS", None)
+    monkeypatch.setattr(batches, "THREADS", None)
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(500)), raising=False)
     assert threads() == 32
 
 
 def test_what_was_set_goes_before_what_the_machine_has(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate, "THREADS", 5)
+    monkeypatch.setattr(batches, "THREADS", 5)
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0}, raising=False)
     assert threads() == 5
 
@@ -45,7 +46,7 @@ def test_residuals_are_the_same_on_one_thread_and_on_three(monkeypatch: pytest.M
     found = []
     monkeypatch.setattr(roll, "_KEPT_BYTES", 0.0)  # each is simulated
     for count in (1, 3):
-        monkeypatch.setattr(simulate, "THREADS", count)
+        monkeypatch.setattr(batches, "THREADS", count)
         found.append(residuals(session.plant, session.layout, windows, [vary(session.plant, [])], 0.005))
     assert np.array_equal(*found)
 

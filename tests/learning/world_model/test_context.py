@@ -6,7 +6,7 @@ import torch
 from bumblebee.learning.world_model.context import context_of
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.randomisation import draw_fields
+from bumblebee.tracking.worlds.randomisation import draw_fields
 
 WORLDS = 16
 

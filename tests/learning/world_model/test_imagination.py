@@ -18,10 +18,10 @@ from bumblebee.sim.effects import single
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig, ObservationConfig, Randomisation, SensorConfig
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.mirror import augmentation
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.terms import see
+from bumblebee.tracking.observing.terms import see
+from bumblebee.tracking.sampling.library import MotionLibrary
 from tests.learning.tiny import env_of
 from tests.sim.test_effect_engine import engine_with
 

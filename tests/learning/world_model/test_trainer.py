@@ -9,7 +9,7 @@ import torch
 from rsl_rl.models import MLPModel
 
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ppo.learner import Trainer
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.dynamics import Dynamics

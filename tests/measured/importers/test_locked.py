@@ -11,8 +11,8 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.importers import import_dataset
 from bumblebee.measured.model_file import copy_model
 from bumblebee.measured.rollout import read_dataset
+from tests.commands.test_cli_diagnosis import run
 from tests.measured.simulated import ARM, ARM_JOINTS, excitation
-from tests.test_cli_diagnosis import run
 
 SERVOS = ARM.replace(
     "ACTUATORS", "".join(f'<position name="{name}" joint="{name}" kp="40" kv="2"/>' for name in ARM_JOINTS)

@@ -11,8 +11,8 @@ from bumblebee.measured.checks import check_rollout
 from bumblebee.measured.importers import read_rollouts
 from bumblebee.measured.importers.map_file import read_map
 from bumblebee.measured.rollout import Rollout
+from tests.commands.test_cli_diagnosis import run
 from tests.measured.importers.remedies.walk import HINGES, model_of, table
-from tests.test_cli_diagnosis import run
 
 MAP = """
 joints: [hip, knee]

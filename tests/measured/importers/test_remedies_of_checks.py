@@ -253,5 +253,5 @@ def test_the_setting_that_a_wrong_convention_names_mends_it(tmp_path: Path, name
 
 
 def test_every_convention_is_walked() -> None:
-    elsewhere = {"target-copy"}  # no setting of the map: tests/measured/test_target_copy.py
+    elsewhere = {"target-copy"}  # no setting of the map: tests/measured/checks/test_target_copy.py
     assert set(conventions._CONVENTIONS) - elsewhere == {name.split(" ")[0] for name in WRONG}

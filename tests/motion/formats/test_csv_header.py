@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
-from bumblebee.motion.usable import usable
+from bumblebee.motion.reading.usable import usable
 from bumblebee.robot.facts import joint_names
 
 SOMA = ["root_translateX", "root_translateY", "root_translateZ", "root_rotateX", "root_rotateY", "root_rotateZ"]

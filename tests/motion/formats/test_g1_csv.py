@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.folder import ReadConfig, read_file
 from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
+from bumblebee.motion.reading.folder import ReadConfig, read_file
 from bumblebee.robot.facts import joint_names
 
 

@@ -10,7 +10,7 @@ from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.formats.layouts import NOTE, arranged, layouts
 from bumblebee.motion.formats.read import read_robot
-from bumblebee.motion.usable import usable
+from bumblebee.motion.reading.usable import usable
 from bumblebee.robot.facts import joint_names, joints
 from tests.motion.formats.test_mjlab_npz import arrays, npz
 from tests.motion.formats.test_pickle_variants import same

@@ -11,7 +11,7 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats import orders
 from bumblebee.motion.formats.read import RobotConfig, is_robot_npz, read_robot
-from bumblebee.motion.usable import usable
+from bumblebee.motion.reading.usable import usable
 from bumblebee.robot.facts import KEY_BODIES, g1_bodies, joint_names
 from bumblebee.robot.model import RobotConfig as ModelConfig
 from bumblebee.robot.model import build_model

@@ -8,7 +8,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.read import RobotConfig, format_of, read_robot
-from bumblebee.motion.usable import usable
+from bumblebee.motion.reading.usable import usable
 
 SHARED = next((p / "shared/data/motions" for p in Path(__file__).parents if (p / "shared/data/motions").is_dir()), None)
 

@@ -10,7 +10,7 @@ from bumblebee.motion.human.floor import floor_height
 from bumblebee.motion.human.frame import require_right_handed, upright_axis, z_up
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.human.read import HumanConfig, read_human
-from bumblebee.motion.walk import motion_sources
+from bumblebee.motion.reading.walk import motion_sources
 from bumblebee.ranges import Unfit
 from tests.motion.human.people import bvh, npz, rows, smpl
 

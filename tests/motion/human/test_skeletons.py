@@ -13,8 +13,8 @@ from bumblebee.motion.human.read import read_human
 from bumblebee.motion.human.roles import find_roles
 from bumblebee.motion.human.skeleton import UnknownSkeleton
 from bumblebee.motion.human.words import side_of, weight
+from bumblebee.motion.reading.walk import motion_sources
 from bumblebee.motion.retarget.retarget import retarget
-from bumblebee.motion.walk import motion_sources
 from tests.motion.human.layouts import LAYOUTS, POINTS
 from tests.motion.human.rigs import Z_UP, Rig, chains, write
 

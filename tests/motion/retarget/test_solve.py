@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.retarget.landmarks import person_of
+from bumblebee.motion.filters.quality import quality
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import lowest, make_clip, sole_points
-from bumblebee.motion.quality import quality
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.retarget import retarget as module
 from bumblebee.motion.retarget.retarget import retarget

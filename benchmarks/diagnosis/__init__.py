@@ -1,0 +1,1 @@
+"""The diagnosis measured: its cost, its numbers, its errors beside other tools."""

@@ -1,0 +1,1 @@
+"""Pages of the study: tables and curves with intervals, a file each."""

@@ -1,0 +1,1 @@
+"""A plan as files and words: CSV and Parquet, `plan.json`, run sheets, the terminal."""

@@ -1,0 +1,1 @@
+"""States at a window's start that no sensor reads, from the log before it."""

@@ -1,0 +1,1 @@
+"""Stills and films of motions, rendered or painted."""

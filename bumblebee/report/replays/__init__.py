@@ -1,0 +1,1 @@
+"""3D replays inside a page, and the windows that they show."""

@@ -1,0 +1,1 @@
+"""Sections of the report: sentences and tables from the results."""

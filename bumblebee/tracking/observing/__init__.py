@@ -1,0 +1,1 @@
+"""Observations of a policy: terms, groups, history, and the errors of sensors."""

@@ -1,0 +1,1 @@
+"""Which motion an episode follows, and from which frame."""

@@ -1,0 +1,1 @@
+"""Differences from world to world in training: physics, ground, pushes."""

@@ -1,0 +1,1 @@
+"""Tools of the operator: the console, its keys and screen, watchers, run sheets."""

@@ -1,0 +1,1 @@
+"""The policy's end of the wire."""

@@ -1,0 +1,1 @@
+"""The simulated robot's end of the wire."""

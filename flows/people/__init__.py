@@ -1,0 +1,1 @@
+"""Who may come to a workspace's servers, and what each may do there."""

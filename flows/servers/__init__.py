@@ -1,0 +1,1 @@
+"""The servers beside a loop: Prefect, MLflow, the operator's page."""

@@ -1,0 +1,1 @@
+"""Policies between stages: training, candidates, cards, copies."""

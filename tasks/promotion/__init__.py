@@ -1,0 +1,1 @@
+"""Whether a version becomes champion: the rule, the question and its answer."""

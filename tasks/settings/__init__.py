@@ -1,0 +1,1 @@
+"""The sections of params.yaml and the files that they name."""
