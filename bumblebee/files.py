@@ -5,14 +5,17 @@ from pathlib import Path
 
 import torch
 
+from bumblebee.io import left_overs
 from bumblebee.io.whole import put
 
 
 def save_tensors(path: Path, content: object) -> None:
-    """`torch.save` by way of memory, whole or not at all.
+    """`torch.save` by way of memory, whole or not at all; what a killed process left of this file is cleared.
 
     torch's own writer turns a full disk into a RuntimeError about its container; here it is the OSError that it is.
     """
-    buffer = io.BytesIO()
+    path, buffer = Path(path), io.BytesIO()
     torch.save(content, buffer)
-    put(Path(path), buffer.getbuffer())
+    if path.parent.is_dir():
+        left_overs.clear(path)
+    put(path, buffer.getbuffer())

@@ -9,6 +9,19 @@ from pathlib import Path
 
 PACKAGES = ("bumblebee", "tasks", "flows")
 Graph = dict[str, set[str]]
+# What a room of `bumblebee` may import beside itself; a floor is a set of rooms that do not know each other.
+FLOORS = [
+    {"robot"},
+    {"effects"},
+    {"motion", "sim", "measured"},
+    {"clustering", "tracking", "diagnosis"},
+    {"learning", "evaluation", "compensation"},
+    {"policy"},
+    {"stand_in"},
+    {"report", "wire", "peers"},
+    {"api", "view"},
+    {"commands"},
+]
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,7 @@
 from html import escape
 from pathlib import Path
 
-from tests.import_graph import graph, reached
-from tests.test_imports import FLOORS
+from tests.import_graph import FLOORS, graph, reached
 
 HOME = Path(__file__).parent.parent
 PICTURE = HOME / "docs" / "rooms.svg"

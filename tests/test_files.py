@@ -1,6 +1,9 @@
 """Tensors are written whole or not at all, and a full disk is an OSError that names the file."""
 
 import errno
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -28,3 +31,15 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
         save_tensors(tmp_path / "a.pt", torch.ones(2))
     assert torch.equal(torch.load(tmp_path / "a.pt", weights_only=True), torch.zeros(2))
     assert [file.name for file in tmp_path.iterdir()] == ["a.pt"]
+
+
+def test_what_a_killed_process_left_of_a_file_goes_with_the_next_save_and_a_living_ones_stays(tmp_path: Path):
+    with subprocess.Popen([sys.executable, "-c", ""]) as gone:
+        pass
+    dead, alive, other = (
+        tmp_path / f".{name}.part" for name in (f"a.pt.{gone.pid}.7", f"a.pt.{os.getpid()}.7", "b.pt.1")
+    )
+    for left in (dead, alive, other):
+        left.write_bytes(b"half")
+    save_tensors(tmp_path / "a.pt", torch.arange(3))
+    assert sorted(tmp_path.iterdir()) == sorted([alive, other, tmp_path / "a.pt"])

@@ -6,23 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.import_graph import circles, graph, source
+from tests.import_graph import FLOORS, circles, graph, source
+from tests.rooms_picture import PICTURE, drawn
 
 HOME = Path(__file__).parent.parent
 ORCHESTRATION = {"prefect", "dvc", "mlflow", "pydantic"}
-# What a room may import beside itself; a floor is a set of rooms that do not know each other.
-FLOORS = [
-    {"robot"},
-    {"effects"},
-    {"motion", "sim", "measured"},
-    {"clustering", "tracking", "diagnosis"},
-    {"learning", "evaluation", "compensation"},
-    {"policy"},
-    {"stand_in"},
-    {"report", "wire", "peers"},
-    {"api", "view"},
-    {"commands"},
-]
 ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"effects", "sim", "measured"}}
 # Below the ground floor: known to everybody.
 FREE = {"DISTRIBUTION", "errors", "files", "io", "last_line", "progress", "quaternions", "ranges", "teller", "__init__"}
@@ -95,8 +83,6 @@ def test_a_folder_has_at_most_twenty_modules():
 
 
 def test_the_picture_of_the_rooms_is_the_codes():
-    from tests.rooms_picture import PICTURE, drawn
-
     assert PICTURE.read_text() == drawn(), "the rooms changed; if they should: python -m tests.rooms_picture"
 
 

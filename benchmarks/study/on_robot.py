@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from bumblebee.evaluation.episodes import rollout_metrics
+from bumblebee.io import left_overs
 from bumblebee.io.whole import put
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import load_policy
@@ -92,4 +93,6 @@ def judged_rows(rollouts: Sequence[Rollout], clips: Sequence[Clip], held_out: Se
 
 def write_csv(path: Path, table: pd.DataFrame) -> None:
     """Write a table whole or not at all."""
+    if path.parent.is_dir():
+        left_overs.clear(path)
     put(path, table.to_csv(index=False).encode())
