@@ -3,6 +3,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 VENV ?= .venv
 MOTIONS ?=
+ROBOT ?=
 SEED ?=
 NAME ?=
 PORTS ?=
@@ -61,11 +62,11 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 # A gate that waits for an answer (status 3) is no error; scripts that must know call python -m flows.demo themselves.
 WAITS = || { status=$$?; test $$status -eq 3 || exit $$status; echo "make $@: not done, a gate waits for your answer (see above); then the same command goes on"; }
 
-demo: setup  ## the whole loop on embedded motions, or on MOTIONS=<folder>; SEED=<n> or null: another sealed robot; VERBOSE=1 shows every line
-	@$(BIN)/python -m flows.demo $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(SEED),--seed "$(SEED)") $(if $(NAME),--name "$(NAME)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)
+demo: setup  ## the whole loop on embedded motions, or on MOTIONS=<folder>; SEED=<n> or null: another sealed robot; ROBOT=<name or folder>; VERBOSE=1 shows every line
+	@$(BIN)/python -m flows.demo $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(SEED),--seed "$(SEED)") $(if $(ROBOT),--robot "$(ROBOT)") $(if $(NAME),--name "$(NAME)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)
 
 smoke: setup  ## the loop with tiny budgets, in runs/smoke
-	@$(BIN)/python -m flows.demo --profile smoke --name $(or $(NAME),smoke) $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)
+	@$(BIN)/python -m flows.demo --profile smoke --name $(or $(NAME),smoke) $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(ROBOT),--robot "$(ROBOT)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)
 
 serve: setup  ## open both servers again, with runs started and resumed from Prefect's pages; NAME=<workspace under runs/>
 	@$(BIN)/python -m flows.servers.serve $(if $(NAME),--name "$(NAME)") $(PORTS)

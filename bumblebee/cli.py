@@ -3,6 +3,7 @@
 Status 0: done, 2: unusable input or output, 1: an internal error; one line on standard error each.
 """
 
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.io.there import require_logs
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 from bumblebee.ranges import Unfit
+from bumblebee.robot.which import VARIABLE, path_of
 from bumblebee.teller import Teller
 
 _EPILOG = "`bumblebee COMMAND --help` explains a command; docs/commands.md has an example of each."
@@ -47,8 +49,13 @@ def root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
+    robot: Annotated[
+        str, typer.Option("--robot", help="A robot's folder, or one of `bumblebee robot list`; by default the G1.")
+    ] = "",
 ) -> None:
     """From motion capture to a humanoid's policy, and from the robot's logs back to the simulator."""
+    if robot:
+        path_of(robot)  # refused here, chosen before (`_choose_robot`)
 
 
 def diagnose(
@@ -235,6 +242,7 @@ def compensate(
 
 def run(arguments: list[str]) -> int:
     """Run one command; what is wrong in its options is said in one line."""
+    _choose_robot(arguments)
     command = typer.main.get_command(app)
     try:
         with command.make_context("bumblebee", list(arguments) or ["--help"]) as context:
@@ -259,6 +267,13 @@ def run(arguments: list[str]) -> int:
         print(" ".join(f"{path}: {text} Try '{path} --help'.".split()), file=sys.stderr)
         return EXIT_BAD_INPUT
     return 0
+
+
+def _choose_robot(arguments: list[str]) -> None:
+    """Take `--robot` before any command is imported: what is made for a robot is made when it is imported."""
+    word, value = [*arguments, "", ""][:2]
+    if word.split("=")[0] == "--robot":
+        os.environ[VARIABLE] = word.partition("=")[2] or value
 
 
 def main() -> None:

@@ -24,6 +24,7 @@ def demo(
     workspace: Workspace = None,
     profile: Annotated[str, typer.Option("--profile", help="File of profiles/ on top of params.yaml.")] = "",
     seed: Annotated[str, typer.Option("--seed", help="Seed of the sealed robot, or `null`: it lacks nothing.")] = "",
+    robot: Annotated[str, typer.Option("--robot", help="A robot's folder, or a name of `robot list`.")] = "",
     verbose: Annotated[bool, typer.Option("--verbose", help="Show every line of every stage.")] = False,
     prefect_port: PrefectPort = 0,
     mlflow_port: MlflowPort = 0,
@@ -39,7 +40,14 @@ def demo(
     from bumblebee.last_line import guarded
     from flows.demo import started
 
-    options = {"motions": motions, "name": name, "workspace": workspace, "profile": profile, "seed": seed}
+    options = {
+        "motions": motions,
+        "name": name,
+        "workspace": workspace,
+        "profile": profile,
+        "seed": seed,
+        "robot": robot,
+    }
     more = {"prefect_port": prefect_port, "mlflow_port": mlflow_port, "verbose": verbose}
     raise typer.Exit(guarded(lambda: started(argparse.Namespace(**options, **more))))
 

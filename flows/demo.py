@@ -51,11 +51,11 @@ def folder_of(options: argparse.Namespace) -> Path:
     Raises:
         BadInput: `--workspace` with an option that would change it.
     """
-    asked = (options.name, options.profile, options.motions, options.seed)
+    asked = (options.name, options.profile, options.motions, options.seed, options.robot)
     if options.workspace is None:
         return choose(*asked)
     if any(asked):
-        names = ("--name", "--profile", "--motions", "--seed")
+        names = ("--name", "--profile", "--motions", "--seed", "--robot")
         came = ", ".join(name for name, value in zip(names, asked, strict=True) if value)
         do = f"Leave one out, or change {options.workspace / 'params.yaml'}."
         raise BadInput("--workspace", "a workspace as it is", f"{came} beside it", do)
@@ -70,6 +70,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--workspace", type=Path, help="an existing workspace anywhere, as it is")
     made.add_argument("--profile", default="", help="file of profiles/ whose values replace those of params.yaml")
     made.add_argument("--seed", default="", help="seed of the robot that is sealed, or `null`: nothing undeclared")
+    made.add_argument("--robot", default="", help="robot's folder, or one of `bumblebee robot list`")
     made.add_argument("--verbose", action="store_true", help="show every line of every stage, not one a stage")
     add_ports(made)
     return made
@@ -81,16 +82,16 @@ def add_ports(made: argparse.ArgumentParser) -> None:
     made.add_argument("--mlflow-port", type=int, default=0, help="port of MLflow's server (default: a free one)")
 
 
-def choose(name: str, profile: str, motions: Path | None, seed: str = "") -> Path:
+def choose(name: str, profile: str, motions: Path | None, seed: str = "", robot: str = "") -> Path:
     """The checkout itself, or the workspace that the options ask for, made or brought up to date."""
-    if not (name or profile or motions or seed):
+    if not (name or profile or motions or seed or robot):
         return workspaces.HOME
-    robot = robot_of(seed)
+    sealed = robot_of(seed)
     if motions is not None and not name:
         name = motions.expanduser().resolve().name
-    name = name or profile or f"seed-{seed}"
+    name = name or profile or (f"seed-{seed}" if seed else Path(robot).name)
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", name)
-    return workspaces.create(workspaces.HOME / "runs" / name, profile or None, motions, **robot)
+    return workspaces.create(workspaces.HOME / "runs" / name, profile or None, motions, robot, **sealed)
 
 
 def robot_of(seed: str) -> dict[str, dict[str, int]]:

@@ -4,6 +4,7 @@ import os
 import sys
 from pathlib import Path
 
+from bumblebee.robot.which import VARIABLE
 from flows.people import login
 from tasks.lab.private import INDEX
 from tasks.lab.servers import read_lab
@@ -58,6 +59,7 @@ def environment(workspace: Path) -> dict[str, str]:
         name = f"%({level.lower()}_run_name)s"
         found[f"PREFECT_LOGGING_FORMATTERS_STANDARD_{level}_RUN_FMT"] = f"%(asctime)s {name} | %(message)s"
     found.pop("PYTHONPATH", None)
+    found.pop(VARIABLE, None)  # the workspace says which robot (tasks/__init__.py)
     found.pop("DVC_STAGE", None)
     found.pop("DVC_ROOT", None)
     return found

@@ -12,6 +12,7 @@ import yaml
 
 import bumblebee
 from bumblebee.errors import BadInput
+from bumblebee.robot.which import FILE, SHIPPED, path_of
 from flows.environment import environment
 from tasks.lab.private import private_index
 from tasks.lab.servers import FILE as LAB
@@ -35,7 +36,7 @@ def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def create(folder: Path, profile: str | None = None, motions: Path | None = None, **over: Any) -> Path:
+def create(folder: Path, profile: str | None = None, motions: Path | None = None, robot: str = "", **over: Any) -> Path:
     """Make `folder` a workspace, or bring an existing one up to date; its data, models and history stay.
 
     A params.yaml that was edited here stays as it is, but for what the call itself asks for.
@@ -44,6 +45,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         folder: where; made if it is not there.
         profile: the name of a file in profiles/ whose values replace those of params.yaml.
         motions: a folder of motion files to use in place of the embedded ones.
+        robot: a robot that comes along, or a robot's folder, in place of the one that is there or of the checkout's.
         over: further sections of params.yaml to replace.
 
     Raises:
@@ -69,6 +71,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         _write(folder / "params.yaml", text)
     if edited is None:
         _write(folder / GENERATED, text)
+    _write_robot(folder / paths.ROBOT, robot)
     for place in (paths.INCOMING, paths.RAW):
         (folder / place).mkdir(parents=True, exist_ok=True)
         _write(folder / place / "README.md", (HOME / place / "README.md").read_text())
@@ -79,6 +82,29 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         _write(folder / ".dvc" / "config", settings.replace("[core]\n", "[core]\n    no_scm = True\n"))
     private_index(folder)
     return folder
+
+
+def _write_robot(place: Path, robot: str) -> None:
+    """The workspace's robot: what is asked for, else what is there, else the checkout's."""
+    if robot:
+        source = path_of(robot)
+        from bumblebee.robot.folder import read_folder  # with MuJoCo, which no other workspace needs
+
+        read_folder(source)
+        if source.parent == SHIPPED:
+            files = {FILE: f"like: {source.stem}\n".encode()}
+        else:
+            files = {file.name: file.read_bytes() for file in sorted(source.parent.iterdir()) if file.is_file()}
+    elif (place / FILE).is_file():
+        return
+    else:
+        files = {file.name: file.read_bytes() for file in (HOME / paths.ROBOT).iterdir()}
+    place.mkdir(parents=True, exist_ok=True)
+    for name in {file.name for file in place.iterdir()} - set(files):
+        (place / name).unlink()
+    for name, content in files.items():
+        if not (place / name).is_file() or (place / name).read_bytes() != content:
+            (place / name).write_bytes(content)
 
 
 def settings_of(folder: Path, profile: str | None) -> tuple[dict[str, Any], dict[str, Any] | None]:

@@ -15,11 +15,13 @@ from typing import Annotated, Any
 import numpy as np
 
 from bumblebee.evaluation.thinning import thin
+from bumblebee.learning import pretrained
 from bumblebee.learning.export import export_shipped
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
-from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.facts import PELVIS, ROBOT, joint_names, limb, limb_bodies, robot_bodies
+from bumblebee.robot.written import SIDES
 from bumblebee.stand_in.sealed import SCHEMA, declared_g1, entry, seal
 from bumblebee.stand_in.undeclared.faults import largest, peaks
 from bumblebee.stand_in.undeclared.kinds import KINDS, Kind, Place, fits
@@ -33,7 +35,7 @@ WORSE = 1.1  # sizes of a draw over those of the draw before
 SMALLEST = 0.4  # share of a kind's largest size that every size has, before `severity`
 LIGHT = 0.25  # kg: bodies below are left out, an effect on them is none
 OF_G1 = tuple(name for name, kind in KINDS.items() if fits(kind, "g1"))
-BODIES = tuple(name for name, body in g1_bodies().items() if float(body["mass"]) >= LIGHT)
+BODIES = tuple(name for name, body in robot_bodies().items() if float(body["mass"]) >= LIGHT)
 
 
 @dataclass(frozen=True)
@@ -95,14 +97,15 @@ class SealConfig(Ranged):
 
     def spots(self, on: str) -> Sequence[str]:
         """Names of the places for what sits on a joint, on a body, on the base (its IMU) or on the whole robot."""
-        return {"joint": self.joints, "body": self.bodies, "base": ("pelvis",)}.get(on, ("",))
+        return {"joint": self.joints, "body": self.bodies, "base": (PELVIS,)}.get(on, ("",))
 
 
 def main() -> None:
     """Draw until the robot is worth it, and seal."""
     config = load("seal", SealConfig)
     rehearsed = load("rollouts", RolloutsConfig).source is None
-    sealed = found(config, trial_clips(config)) if config.n_effects and rehearsed else sealed_robot(config, 0)
+    tried = config.n_effects and rehearsed and ROBOT == pretrained.THEIRS  # no policy comes along for another robot
+    sealed = found(config, trial_clips(config)) if tried else sealed_robot(config, 0)
     with output_file(paths.SEALED_ROBOT) as path:
         path.write_text(json.dumps(sealed, indent=1) + "\n")
     print(f"sealed {len(sealed['effects'])} effects, sha256 {sealed['sha256'][:12]}")
@@ -184,9 +187,10 @@ def somewhere(names: Sequence[str], rng: np.random.Generator) -> str:
 
 def region(name: str) -> str:
     """Where a joint or body is: leg, waist or arm; what is neither counts as waist."""
-    if any(part in name for part in ("hip", "knee", "ankle")):
-        return "leg"
-    return "arm" if any(part in name for part in ("shoulder", "elbow", "wrist", "hand")) else "waist"
+    for which, end in (("leg", "foot"), ("arm", "hand")):
+        if any(name in (*limb_bodies(side, end), *limb(side, end)) for side in SIDES):
+            return which
+    return "waist"
 
 
 def drawn_place(name: str, rng: np.random.Generator) -> Place:

@@ -12,7 +12,7 @@ Graph = dict[str, set[str]]
 # What a room of `bumblebee` may import beside itself; a floor is a set of rooms that do not know each other.
 FLOORS = [
     {"robot"},
-    {"effects"},
+    {"effects", "new_robot"},
     {"motion", "sim", "measured"},
     {"clustering", "tracking", "diagnosis"},
     {"learning", "evaluation", "compensation"},

@@ -17,7 +17,7 @@ from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.reading.listing import find_motions
 from bumblebee.motion.retarget.collision import depths, obstacles, shape_heights
 from bumblebee.motion.retarget.config import RetargetConfig
-from bumblebee.motion.retarget.mapping import CORNERS, Robot, g1, read_robot
+from bumblebee.motion.retarget.mapping import CORNERS, Robot, read_robot, this_robot
 from bumblebee.motion.retarget.retarget import aim, fit
 from bumblebee.motion.retarget.solve import Trajectory
 from bumblebee.motion.retarget.tree import Poses, points, poses
@@ -95,7 +95,7 @@ def main() -> None:
     parser.add_argument("--motions", nargs="+", help="names; all without")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    robot = read_robot(options.model, options.mapping) if options.model else g1()
+    robot = read_robot(options.model, options.mapping) if options.model else this_robot()
     rows = {}
     for found in find_motions(options.people):
         for motion in found.motions:

@@ -6,7 +6,6 @@ head, pelvis, hands and feet. docs/decisions/clustering-features.md says which f
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from math import ceil
 
 import numpy as np
@@ -15,11 +14,13 @@ from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.contacts import foot_contacts
 from bumblebee.motion.kinematics import forward_bodies
-from bumblebee.robot.facts import FEET, KEY_BODIES, g1_bodies
+from bumblebee.robot import facts
+from bumblebee.robot.facts import BODY_OF, FEET, KEY_BODIES, PELVIS
 
 HEAD = "head"
+_HEAD_BODY, _HEAD_PLACE = facts.HEAD
 POSITIONS = (*KEY_BODIES, HEAD)
-KEPT_POSITIONS = ("pelvis", HEAD, "left_wrist_yaw_link", "right_wrist_yaw_link", *FEET)
+KEPT_POSITIONS = (PELVIS, HEAD, BODY_OF["left_hand"], BODY_OF["right_hand"], *FEET)
 
 _FEET = [KEY_BODIES.index(foot) for foot in FEET]
 
@@ -75,10 +76,10 @@ def window_times(clip: Clip, fps: float, seconds: float) -> list[tuple[float, fl
 def positions(clip: Clip, frames: np.ndarray) -> np.ndarray:
     """Positions of `POSITIONS` in some frames (T,) of the clip, (T, 15, 3) [m, world].
 
-    The G1 has no head link: the head is a point of `torso_link`, the centre of its collision sphere `head_collision`.
+    The head is a point of a body: the G1 has no head link, and its point is the centre of its sphere `head_collision`.
     """
-    pos, quat = forward_bodies(clip.root_pos[frames], clip.root_quat[frames], clip.joint_pos[frames])["torso_link"]
-    head = pos + quaternions.rotate(quat, _head_in_torso())
+    pos, quat = forward_bodies(clip.root_pos[frames], clip.root_quat[frames], clip.joint_pos[frames])[_HEAD_BODY]
+    head = pos + quaternions.rotate(quat, np.array(_HEAD_PLACE))
     return np.concatenate([clip.key_pos[frames], head[:, None]], 1)
 
 
@@ -117,12 +118,6 @@ def _window(
     feet = _unyaw(feet_velocity[frames], yaw)
     parts = (seen, translation, _unyaw(velocity[frames], yaw), contacts[frames], feet)
     return np.concatenate([part.reshape(len(frames), -1) for part in parts], 1).astype(np.float32)
-
-
-@cache
-def _head_in_torso() -> np.ndarray:
-    shapes = {shape["name"]: shape for shape in g1_bodies()["torso_link"]["collision"]}
-    return np.array(shapes["head_collision"]["pos"])
 
 
 def _unyaw(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:

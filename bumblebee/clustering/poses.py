@@ -2,20 +2,20 @@
 
 import numpy as np
 
-from bumblebee.clustering.features import POSITIONS, heading, positions
+from bumblebee.clustering.features import HEAD, POSITIONS, heading, positions
 from bumblebee.motion.clip import Clip
+from bumblebee.robot.facts import BODY_OF, PELVIS, TORSO
+from bumblebee.robot.written import SIDES
 
 COUNT = 4
 """Poses of a clip: at its start, a third, two thirds, its end."""
 SEEN_FROM = np.deg2rad(35.0)
 """Angle between the direction that the motion begins in and the picture's plane: arms and legs of both sides show."""
 _CHAINS = (
-    ("pelvis", "torso_link", "head"),
-    *(tuple(["pelvis", *(f"{side}_{part}" for part in ("hip_roll_link", "knee_link", "ankle_roll_link"))])
-      for side in ("left", "right")),
-    *(tuple(["torso_link", *(f"{side}_{part}" for part in ("shoulder_roll_link", "elbow_link", "wrist_yaw_link"))])
-      for side in ("left", "right")),
-)  # fmt: skip
+    (PELVIS, TORSO, HEAD),
+    *((PELVIS, *(BODY_OF[f"{side}_{part}"] for part in ("hip", "knee", "foot"))) for side in SIDES),
+    *((TORSO, *(BODY_OF[f"{side}_{part}"] for part in ("shoulder", "elbow", "hand"))) for side in SIDES),
+)
 BONES = tuple(tuple(POSITIONS.index(name) for name in chain) for chain in _CHAINS)
 """Lines of the figure: spine, left leg, right leg, left arm, right arm, as rows of a pose."""
 

@@ -11,9 +11,10 @@ from bumblebee.clustering.kinds import kinds
 from bumblebee.clustering.text import FILLERS, plain_text
 from bumblebee.motion.clip import Clip, displacement, velocities
 from bumblebee.motion.contacts import foot_contacts
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import columns, joint_names, limb
+from bumblebee.robot.written import SIDES
 
-LOWER = tuple(i for i, name in enumerate(joint_names()) if any(part in name for part in ("hip", "knee", "ankle")))
+LOWER = tuple(sorted(columns(tuple(name for side in SIDES for name in limb(side, "foot")))))
 UPPER = tuple(i for i in range(len(joint_names())) if i not in LOWER)
 COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint", "airborne")
 MORE = ("turn", "lowest")

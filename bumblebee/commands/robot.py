@@ -1,29 +1,87 @@
-"""Command line: `bumblebee robot inspect`."""
+"""Command line: `bumblebee robot inspect`, `check`, `list`."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-app = typer.Typer(help="Look at a robot's model.", no_args_is_help=True, add_completion=False)
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
+
+app = typer.Typer(
+    help="Look at a robot's model, and make a robot's folder of it.", no_args_is_help=True, add_completion=False
+)
 
 _PAIRS = 20  # of bodies that are listed
 
 
 @app.callback()
 def robot() -> None:
-    """Look at a robot's model."""
+    """Look at a robot's model, and make a robot's folder of it."""
+
+
+@app.command("list")
+def list_() -> None:
+    """Print the robots that come along, and which one is chosen."""
+    from bumblebee.robot.which import VARIABLE, chosen_name, shipped
+
+    chosen = chosen_name()
+    for name in shipped():
+        print(f"{name}{'  (chosen)' if name == chosen else ''}")
+    if chosen not in shipped():
+        print(f"{chosen}  (chosen)")
+    print(f"Another: `bumblebee --robot NAME ...`, or {VARIABLE}=NAME; a folder of your own in the place of NAME.")
+
+
+@app.command()
+def check(
+    folder: Annotated[
+        str | None, typer.Argument(metavar="FOLDER", help="A robot's folder, or a name of `list`.")
+    ] = None,
+) -> None:
+    """Say whether a robot's folder describes a robot that can be trained: nine checks, status 2 if one fails."""
+    from bumblebee.robot.which import VARIABLE
+
+    if folder is not None:
+        os.environ[VARIABLE] = folder
+    from bumblebee.new_robot.check import check as tried
+    from bumblebee.robot.facts import ROBOT, joint_names
+
+    findings = tried()
+    print(plain(f"{ROBOT}: {len(joint_names())} joints"))
+    for one in findings:
+        print(plain(f"  {'yes' if one.holds else 'NO '}  {one.name}{'' if one.holds else ': ' + one.found}"))
+    if not all(one.holds for one in findings):
+        raise typer.Exit(EXIT_BAD_INPUT)
 
 
 @app.command()
 def inspect(
-    model: Annotated[Path | None, typer.Argument(metavar="MODEL.xml", help="An MJCF; without, the G1.")] = None,
+    model: Annotated[
+        Path | None, typer.Argument(metavar="MODEL.xml", help="An MJCF; without, the chosen robot.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write a robot's folder: the model, a first robot.yaml, a picture.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a folder that is there.")] = False,
 ) -> None:
-    """Print joints with their limits and gains, and what can touch what."""
+    """Print joints with their limits and gains, and what can touch what; or write a first folder of a robot."""
+    if out is not None:
+        from bumblebee.new_robot.first_folder import draft_folder
+
+        if model is None:
+            raise BadInput(
+                "--out", "the MJCF that the folder is made of", "none", "bumblebee robot inspect MODEL.xml --out FOLDER"
+            )
+        asked = draft_folder(model, out, overwrite)
+        print(plain(f"{out}: robot.yaml, {model.name}, robot.svg. Look at the picture, then tell it:"))
+        for question in asked:
+            print(plain(f"  {question}"))
+        print(plain(f"Then: bumblebee robot check {out}"))
+        return
     import mujoco
     import numpy as np
 
-    from bumblebee.errors import plain
     from bumblebee.measured.model_file import load_spec
     from bumblebee.robot.drives import explicit_drives
     from bumblebee.robot.model import build_spec

@@ -34,7 +34,7 @@ TABLE: dict[str, tuple[Command, ...]] = {
         Command(
             "view", "bumblebee.commands.view:view", "Show motions, a policy live, or measured rollouts in the browser."
         ),
-        Command("robot", "bumblebee.commands.robot:app", "Print joints, limits, gains and contacts of a model."),
+        Command("robot", "bumblebee.commands.robot:app", "Print a model's joints; make and check a robot's folder."),
         Command("doctor", "bumblebee.commands.doctor:doctor", "Say what this machine lacks, each with a remedy."),
         Command("settings", "flows.cli_settings:settings", "Print every key of params.yaml with its meaning."),
     ),

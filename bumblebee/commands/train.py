@@ -35,14 +35,20 @@ def train(
     from bumblebee.api.training import TrainConfig, parent_of, require_ready
     from bumblebee.api.training import train as fit
     from bumblebee.io.write import refuse_overlap
+    from bumblebee.learning import pretrained
     from bumblebee.motion.cache import user_cache
     from bumblebee.motion.reading.few_lines import said_of
     from bumblebee.motion.reading.folder import ReadConfig, read_folder
     from bumblebee.motion.reading.one_file import stated
+    from bumblebee.policy.card_text import NOTHING
     from bumblebee.report.wording import plural
+    from bumblebee.robot.facts import ROBOT
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
+    if start == "shipped" and ROBOT != pretrained.THEIRS:
+        print(f"no policy comes along for {ROBOT}: training begins from nothing")
+        start = NOTHING
     chosen = {"minutes": minutes, "gpu": gpu, "start": start, "learner": learner, "held_out": held_out}
     config = TrainConfig(**chosen, worlds=worlds, threads=threads, seed=seed)  # type: ignore[arg-type]
     refuse_overlap(out, [folder])

@@ -9,7 +9,7 @@ import numpy as np
 from bumblebee.compensation.limits import CompensationLimits
 from bumblebee.compensation.numbers import Compensation, Load, PlannedEffect
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import g1_bodies, joint_names, joints
+from bumblebee.robot.facts import joint_names, joints, robot_bodies
 from bumblebee.robot.model import gains
 from bumblebee.sim.effects import Effect
 
@@ -36,7 +36,7 @@ class DeclaredRobot:
     def of(cls, model: mujoco.MjModel, where: object = "model") -> "DeclaredRobot":
         """From the model that the policy was trained on; one without the G1's joints is a `BadInput`."""
         have = {model.joint(i).name for i in range(model.njnt)} | {model.body(i).name for i in range(model.nbody)}
-        if missing := [name for name in (*joint_names(), *g1_bodies()) if name not in have]:
+        if missing := [name for name in (*joint_names(), *robot_bodies()) if name not in have]:
             came = f"one without {missing[0]} ({len(missing)} joints, bodies missing)"
             raise BadInput(where, "a model of the G1", came, ONLY_G1)
         table = joints()

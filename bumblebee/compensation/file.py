@@ -17,7 +17,7 @@ from bumblebee.io.limits import Limits
 from bumblebee.io.read import read_json
 from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output, write_file
 from bumblebee.ranges import Unfit
-from bumblebee.robot.facts import ROBOT, g1_bodies, joint_names
+from bumblebee.robot.facts import ROBOT, joint_names, robot_bodies
 from bumblebee.robot.model import build_model
 from bumblebee.sim.effects import read_term
 
@@ -187,7 +187,7 @@ def _term(where: str, row: Any) -> tuple[int, float, str]:
 
 def _load(where: str, entry: Any) -> Load:
     _keys(where, entry, {"body", "mass", "com"})
-    if entry["body"] not in g1_bodies():
+    if entry["body"] not in robot_bodies():
         raise BadInput(f"{where}.body", "a body of the G1", repr(entry["body"])[:80], _AGAIN)
     mass = _numbers(f"{where}.mass", entry["mass"], 2)
     if not (mass > 0).all():

@@ -12,7 +12,7 @@ from bumblebee.compensation.numbers import Compensation, PlannedEffect
 from bumblebee.effects.kind import CannotUndo
 from bumblebee.errors import BadInput
 from bumblebee.measured.model_file import load_model
-from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.facts import joint_names, robot_bodies
 from bumblebee.robot.model import build_model
 from bumblebee.sim.effects import CATALOGUE, Effect, effects_yaml, read_effects, read_term
 
@@ -82,7 +82,7 @@ def _columns(place: str, effect: Effect) -> list[int]:
     """Columns of an effect's joints; a place that the G1 does not have is a `BadInput`."""
     names, kind = joint_names(), CATALOGUE[effect.effect]
     if kind.on == "body":
-        if unknown := [name for name in effect.where if name not in g1_bodies()]:
+        if unknown := [name for name in effect.where if name not in robot_bodies()]:
             raise BadInput(place, "a body of the G1", f"{unknown[0]!r}, of another robot")
         return []
     if kind.on != "joint":

@@ -7,7 +7,7 @@ from bumblebee.compensation.draft import ONLY_G1, DeclaredRobot
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_json
 from bumblebee.measured.model_file import load_model
-from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.facts import joint_names, robot_bodies
 from bumblebee.sim.effects import CATALOGUE, read_effects
 
 
@@ -32,5 +32,5 @@ def require_g1(effects: Path, model: Path | None = None) -> None:
 
 def _refuse_others(where: Path, names: Iterable[str]) -> None:
     names = list(names)
-    if names and not {*joint_names(), *g1_bodies()}.intersection(names):
+    if names and not {*joint_names(), *robot_bodies()}.intersection(names):
         raise BadInput(where, "joints and bodies of the G1", f"{names[0]!r}, of another robot", ONLY_G1)

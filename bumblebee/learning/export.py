@@ -10,7 +10,7 @@ from bumblebee.learning import pretrained
 from bumblebee.learning.generalist.transformer import TransformerModel
 from bumblebee.learning.onnx_graph import IR_VERSION, OPSET, Graph, behind_memory, layers, normalised
 from bumblebee.learning.policy import Policy, load_policy
-from bumblebee.robot.facts import ROBOT, joint_names, joints, stand_pose
+from bumblebee.robot.facts import IDENTITY, ROBOT, joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.observing.needs import needed
@@ -72,6 +72,7 @@ def contract(
     return {
         "schema": 1,
         "robot": ROBOT,
+        "robot_sha256": IDENTITY,
         "joints": list(joint_names()),
         "kp": [round(kp, 6) for kp, _ in table],
         "kd": [round(kd, 6) for _, kd in table],

@@ -14,7 +14,9 @@ from torch import Tensor
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.generalist.transformer import TransformerConfig, TransformerModel
-from bumblebee.learning.pretrained import NO_POLICY
+from bumblebee.learning.pretrained import NAMES, NO_POLICY, THEIRS
+from bumblebee.robot.facts import IDENTITY, ROBOT
+from bumblebee.robot.identity import require_robot
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
 
@@ -130,7 +132,8 @@ class Policy:
 
     def save(self, folder: Path) -> None:
         """Write `policy.pt` into an existing folder."""
-        content = {"shape": asdict(self.shape), "actor": self.actor.state_dict(), "critic": self.critic_state}
+        own = {"robot": ROBOT, "robot_sha256": IDENTITY}
+        content = {**own, "shape": asdict(self.shape), "actor": self.actor.state_dict(), "critic": self.critic_state}
         save_tensors(Path(folder) / FILE, content)
 
 
@@ -147,7 +150,7 @@ def load_policy(folder: Path) -> Policy:
     """Read `policy.pt`; only tensors and plain values are unpickled.
 
     Raises:
-        BadInput: if there is none, or it is no checkpoint of a policy.
+        BadInput: if there is none, it is no checkpoint of a policy, or one for another robot.
     """
     path = Path(folder) / FILE
     try:
@@ -160,6 +163,8 @@ def load_policy(folder: Path) -> Policy:
         raise BadInput(path, "a trained policy", "no file", NO_POLICY) from None
     except Exception as error:
         raise BadInput(path, "a checkpoint of a policy", str(error).splitlines()[0]) from None
+    known = {"robot": THEIRS} if Path(folder) in NAMES else {}
+    require_robot(path, known | content, shape.actions)
     return Policy(actor, content["critic"], shape)
 
 

@@ -14,7 +14,8 @@ from scipy import ndimage
 from bumblebee import quaternions
 from bumblebee.motion.kinematics import forward_bodies, lowest, sole_points
 from bumblebee.ranges import Range, Ranged
-from bumblebee.robot.facts import FEET, joint_names, joints
+from bumblebee.robot.facts import BODY_OF, FEET, ankles, columns, joints
+from bumblebee.robot.written import SIDES
 
 Method = Literal["refit", "lower", "off"]
 
@@ -71,17 +72,18 @@ def level_ankles(
     heights = sole_points(root_pos, root_quat, joint_pos)[..., 2].min(axis=2)  # (T, 2)
     levelled = np.array(joint_pos, dtype=np.float64)
     for side, foot in enumerate(FEET):
-        name = foot.split("_")[0]
-        pitch, roll = (joint_names().index(f"{name}_ankle_{axis}_joint") for axis in ("pitch", "roll"))
-        shin = poses[f"{name}_knee_link"][1]
+        turns = {int(np.argmax(np.abs(joints()[column].axis))): column for column in columns(ankles(SIDES[side]))}
+        shin = poses[BODY_OF[f"{SIDES[side]}_knee"]][1]
         up = quaternions.rotate(quaternions.conjugate(shin), [0.0, 0.0, 1.0])
         level = np.stack([np.arctan2(up[:, 0], up[:, 2]), -np.arcsin(np.clip(up[:, 1], -1, 1))], axis=1)
-        limits = np.array([joints()[pitch].range, joints()[roll].range])
+        own = [(turns[axis], angle) for axis, angle in ((1, 0), (0, 1)) if axis in turns]  # pitch about y, roll about x
+        ankle, level = [column for column, _ in own], level[:, [angle for _, angle in own]]
+        limits = np.array([joints()[column].range for column in ankle])
         level = np.clip(level, limits[:, 0], limits[:, 1])
         speed = np.linalg.norm(np.gradient(poses[foot][0], axis=0), axis=1) * fps
         weight = _falling(heights[:, side], config.level_below) * _falling(speed, 1.0)
         weight = ndimage.gaussian_filter1d(weight, 0.06 * fps, mode="nearest")[:, None]
-        levelled[:, [pitch, roll]] = (1 - weight) * levelled[:, [pitch, roll]] + weight * level
+        levelled[:, ankle] = (1 - weight) * levelled[:, ankle] + weight * level
     return levelled
 
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
-from bumblebee.robot.facts import FEET, KEY_BODIES, g1_bodies, joint_names
+from bumblebee.robot.facts import FEET, KEY_BODIES, SOLE_RADIUS, SOLES, joint_names, robot_bodies
+
+_DOWN = (0.0, 0.0, SOLE_RADIUS)  # m from a corner's sphere to the floor
 
 
 def forward_bodies(
@@ -46,7 +48,7 @@ def lowest_heights(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.nd
     """Height of the lowest point of each body that has collision primitives: name -> (T,) [m, world]."""
     heights = {}
     for name, (pos, quat) in forward_bodies(root_pos, root_quat, joint_pos).items():
-        if "collision" in g1_bodies()[name]:
+        if "collision" in robot_bodies()[name]:
             centres, radii = _centres(name)  # (N, 3), (N,): a capsule has one at either end
             w, x, y, z = quat.T
             up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
@@ -62,8 +64,10 @@ def lowest(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray) -
 def sole_points(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
     """Heel and toe corners of both soles, (T, 2, 4, 3) [m, world], left foot first."""
     poses = forward_bodies(root_pos, root_quat, joint_pos)
-    corners = np.array([(x, y, -0.035) for x in (-0.044, 0.123) for y in (-0.021, 0.021)])
-    feet = [poses[foot][0][:, None] + quaternions.rotate(poses[foot][1][:, None], corners[None]) for foot in FEET]
+    feet = [
+        poses[foot][0][:, None] + quaternions.rotate(poses[foot][1][:, None], (np.array(soles) - _DOWN)[None])
+        for foot, soles in zip(FEET, SOLES, strict=True)
+    ]
     return np.stack(feet, axis=1)
 
 
@@ -86,7 +90,7 @@ def make_clip(
 def _tree() -> list[tuple[str, str, np.ndarray, np.ndarray | None, np.ndarray, int | None]]:
     """For each body: name, parent, offset (3,) [m], fixed rotation (4,) or None, joint axis (3,), its column."""
     rows = []
-    for name, facts in g1_bodies().items():
+    for name, facts in robot_bodies().items():
         fixed = None if facts["quat"] == [1.0, 0.0, 0.0, 0.0] else quaternions.normalised(facts["quat"])
         joint = facts.get("joint", {"name": "", "axis": (0.0, 0.0, 0.0)})
         column = joint_names().index(joint["name"]) if joint["name"] in joint_names() else None
@@ -98,7 +102,7 @@ def _tree() -> list[tuple[str, str, np.ndarray, np.ndarray | None, np.ndarray, i
 def _centres(body: str) -> tuple[np.ndarray, np.ndarray]:
     """Centres (N, 3) [m, body] and radii (N,) [m] of a body's spheres and of the ends of its capsules."""
     centres, radii = [], []
-    for geom in g1_bodies()[body]["collision"]:
+    for geom in robot_bodies()[body]["collision"]:
         capsule = geom["type"] == "capsule"
         reach = quaternions.rotate(geom["quat"], [0.0, 0.0, geom["size"][1]]) if capsule else np.zeros(3)
         ends = (1.0, -1.0) if capsule else (0.0,)

@@ -20,7 +20,7 @@ from bumblebee.motion.reading.listing import Found, find_motions, reason_of
 from bumblebee.motion.reading.nothing import nothing
 from bumblebee.motion.reading.one_file import FileConfig
 from bumblebee.motion.retarget.config import RetargetConfig
-from bumblebee.motion.retarget.mapping import Robot, g1, read_robot
+from bumblebee.motion.retarget.mapping import Robot, read_robot, this_robot
 from bumblebee.motion.retarget.retarget import aim, fit, fit_notes, root_quat
 from bumblebee.motion.side_by_side import in_order
 from bumblebee.motion.texts import shown
@@ -141,7 +141,7 @@ def _made(job: _Job, config: RobotFiles) -> _Done:
 @lru_cache(maxsize=1)
 def _robot(model: Path | None, mapping: Path | None) -> Robot:
     """Read once in each process: a model with meshes is large."""
-    return read_robot(model, mapping) if model is not None and mapping is not None else g1()
+    return read_robot(model, mapping) if model is not None and mapping is not None else this_robot()
 
 
 def content_of(motion: HumanMotion, robot: Robot, config: RobotFiles) -> tuple[bytes, tuple[str, ...]]:

@@ -14,7 +14,7 @@ from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.human.motion import LANDMARKS
 from bumblebee.motion.kinematics import forward_bodies, lowest, sole_points
-from bumblebee.robot.facts import g1_bodies
+from bumblebee.robot.facts import robot_bodies
 
 GRAVITY = 9.81
 AIR = 0.01  # m: no point of the robot is nearer to the floor
@@ -108,5 +108,5 @@ def _kept(held: np.ndarray, fps: float) -> np.ndarray:
 @cache
 def _masses() -> tuple[dict[str, float], dict[str, np.ndarray]]:
     """Mass [kg] and centre of mass (3,) [m, body] of each body."""
-    bodies = g1_bodies()
+    bodies = robot_bodies()
     return {n: f["mass"] for n, f in bodies.items()}, {n: np.asarray(f["com"]) for n, f in bodies.items()}

@@ -13,7 +13,7 @@ from bumblebee.io.read import read_yaml
 from bumblebee.peers import CONTRACTS
 from bumblebee.peers.terms import TERMS
 from bumblebee.ranges import Name, Range, Ranged, Size, Unfit
-from bumblebee.robot.facts import WRIST_JOINTS, joint_names
+from bumblebee.robot.facts import HELD_JOINTS, joint_names
 
 _KEYS = "docs/peers.md lists the fields."
 _ROUNDING = 1e-6
@@ -125,9 +125,9 @@ class PeerContract(Ranged):
         return sum(block.steps * sum(term.size(len(self.joints)) for term in self.terms(block)) for block in self.input)
 
     @property
-    def dof(self) -> Literal[23, 29]:
-        """Actuated joints of the G1 that it was trained for."""
-        return 29 if set(self.joints) & set(WRIST_JOINTS) else 23
+    def every_joint(self) -> bool:
+        """Whether it was trained for a G1 whose wrists move."""
+        return bool(set(self.joints) & set(HELD_JOINTS))
 
     def terms(self, block: Block) -> Iterator[Term]:
         """Terms of a block at one step, in order."""
@@ -206,7 +206,7 @@ def _check_rates(where: str, contract: PeerContract) -> None:
 def _check_joints(where: str, contract: PeerContract) -> None:
     """Refuse another robot's joints, and lists of another length."""
     joints = contract.joints
-    known, needed = joint_names(29), joint_names()
+    known, needed = joint_names(every=True), joint_names()
     for i, name in enumerate(joints):
         if name not in known or name in joints[:i]:
             raise BadInput(f"{where}: joints[{i}]", "each joint of the G1 once", name[:60], "Is it another robot's?")

@@ -5,11 +5,10 @@ import math
 import torch
 from torch import Tensor
 
-from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.facts import HEAD, joint_names, path_to, robot_bodies
 from bumblebee.sim.rotations import from_rotation_vector, multiply, rotate
 
-_WAIST = ("waist_yaw_link", "waist_roll_link", "torso_link")
-_HEAD = (0.0, 0.0, 0.43)  # m in the torso's frame: the middle of the head's collision sphere
+_HEAD_BODY, _HEAD = HEAD
 
 
 def heading_inverse(quat: Tensor) -> Tensor:
@@ -50,8 +49,8 @@ def head_pos_w(root_pos_w: Tensor, root_quat_w: Tensor, joint_pos: Tensor) -> Te
         joint_pos: (B, 23) [rad].
     """
     place, quat = root_pos_w, root_quat_w
-    for body in _WAIST:
-        facts = g1_bodies()[body]
+    for body in path_to(_HEAD_BODY)[1:]:
+        facts = robot_bodies()[body]
         place = place + rotate(quat, _fixed(facts["pos"], place))
         joint = facts["joint"]
         angle = joint_pos[:, joint_names().index(joint["name"]), None]

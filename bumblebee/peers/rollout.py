@@ -23,11 +23,15 @@ class JointOrder:
 
     Args:
         contract: the peer's.
-        model_dof: joints of the model, 23 or 29.
+        model_joints: number of the model's joints: those that are actuated here, or every one.
     """
 
-    def __init__(self, contract: PeerContract, model_dof: int) -> None:
-        motion, model, peer = joint_names(), joint_names(29 if model_dof == 29 else 23), contract.joints
+    def __init__(self, contract: PeerContract, model_joints: int) -> None:
+        motion, model, peer = (
+            joint_names(),
+            joint_names(every=model_joints == len(joint_names(every=True))),
+            contract.joints,
+        )
         self._model_of_motion = _columns(model, motion)
         self._peer_of_motion = _columns(peer, motion)
         self._peer_of_model = _columns(peer, model)

@@ -18,19 +18,22 @@ def peer_model(contract: PeerContract, model: Whose, servos: Whose) -> mujoco.Mj
 
     Args:
         contract: the peer's facts.
-        model: "own": its joints, physics rate, rotor inertias and floor friction; "declared": ours, 23 joints, 200 Hz.
+        model: "own": its joints, physics rate, rotor inertias and floor friction; "declared": ours, 200 Hz.
             Bodies, masses and contacts are the G1's of `bumblebee robot` in both.
         servos: "own": its stiffness, damping and torque limits, within the motors'; "declared": ours.
     """
     own = model == "own"
-    dof = contract.dof if own else 23
-    spec = build_spec(RobotConfig(dof=dof, timestep=1.0 / (contract.physics_hz if own else PHYSICS_HZ)))
+    spec = build_spec(
+        RobotConfig(
+            every_joint=own and contract.every_joint, timestep=1.0 / (contract.physics_hz if own else PHYSICS_HZ)
+        )
+    )
     add_foot_sensors(spec)
     if own:
         spec.geom(FLOOR).friction = [contract.floor_friction, *spec.geom(FLOOR).friction[1:]]
         spec.geom(FLOOR).priority = 1
     column = {name: i for i, name in enumerate(contract.joints)}
-    for joint in joints(dof):
+    for joint in joints(own and contract.every_joint):
         i, servo = column.get(joint.name), spec.actuator(joint.name)
         if i is None:
             continue

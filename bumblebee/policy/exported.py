@@ -10,7 +10,8 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes, read_json
 from bumblebee.policy.checks import check_fields, check_self_contained, check_tensors
-from bumblebee.robot.facts import ROBOT, joint_names, joints
+from bumblebee.robot.facts import joint_names, joints
+from bumblebee.robot.identity import require_robot
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.observing.needs import needed
@@ -120,9 +121,7 @@ def read_policy_contract(path: Path) -> dict[str, Any]:
     if missing:
         raise BadInput(f"{path}: field {missing[0]}", "a policy contract", "no such field", "Export the policy again.")
     check_fields(path, contract)
-    if contract.get("robot", ROBOT) != ROBOT:
-        came = repr(contract["robot"])[:60]
-        raise BadInput(f"{path}: robot", repr(ROBOT), came, "The policy was made for another robot.")
+    require_robot(path, contract, len(contract["joints"]))
     _check_joints(path, contract)
     if contract["action"].get("feed_forward") not in FEED_FORWARDS:
         came = str(contract["action"]["feed_forward"])[:80]

@@ -1,7 +1,7 @@
-"""Builds the G1's MuJoCo model from the table of facts, through MjSpec.
+"""Builds the robot's MuJoCo model from its table of facts, through MjSpec.
 
 Low-level control is a position servo on each joint, torque = kp (target - q) - kd qd, clipped to the
-motor's limit (paper, appendix A: PD controller on 23 of 29 DoF).
+motor's limit (paper, appendix A: PD controller on 23 of the G1's 29 DoF).
 """
 
 from dataclasses import dataclass
@@ -11,26 +11,35 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
-from bumblebee.robot.facts import FEET, WRIST_JOINTS, Joint, g1_bodies, joint_names, joints, stand_pose
+from bumblebee.robot.facts import (
+    FEET,
+    HELD_JOINTS,
+    ROBOT,
+    SOLE_RADIUS,
+    SOLES,
+    Joint,
+    joint_names,
+    joints,
+    made_joint,
+    robot_bodies,
+    stand_pose,
+)
+from bumblebee.robot.written import SIDES
 
 NATURAL_FREQUENCY = 2 * np.pi * 10  # rad/s: of the servo and its rotor alone
 DAMPING_RATIO = 2.0
 
-# Sphere feet: heel and toe corners of the sole in the foot's frame [m]; the radius is that of the sole's capsules.
-_SOLE_RADIUS = 0.01
-_SOLE_CORNERS = [(x, y, -0.025) for x in (-0.044, 0.123) for y in (-0.021, 0.021)]
-
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """Which G1 model is built."""
+    """Which model of the robot is built."""
 
     feet: Literal["spheres", "capsules"] = "spheres"
-    """Sole contact: four corner spheres (twice as fast) or the seven capsules of the full model."""
+    """Sole contact: four corner spheres (twice as fast) or the capsules of the full model."""
     timestep: float = 0.005
     """Physics step [s]."""
-    dof: Literal[23, 29] = 23
-    """23 locks the six wrist joints."""
+    every_joint: bool = False
+    """Joints that the robot's file holds still, such as the G1's wrists, move and are driven, too."""
     self_collision: bool = False
     """Contacts between the robot's own links; off, only the floor is touched."""
     frictionloss: float = 0.0
@@ -40,25 +49,27 @@ class RobotConfig:
 
 
 def gains(joint: Joint) -> tuple[float, float]:
-    """Servo gains (kp [N m/rad], kd [N m s/rad]) from the rotor inertia: 10 Hz, damping ratio 2."""
+    """Servo gains (kp [N m/rad], kd [N m s/rad]): the robot's own, or by the rotor inertia: 10 Hz, damping ratio 2."""
+    if joint.kp is not None and joint.kd is not None:
+        return joint.kp, joint.kd
     return joint.armature * NATURAL_FREQUENCY**2, 2 * DAMPING_RATIO * joint.armature * NATURAL_FREQUENCY
 
 
 def build_spec(config: RobotConfig | None = None) -> mujoco.MjSpec:
-    """The G1 on a floor, as an editable spec; body, joint and actuator names are Unitree's."""
+    """The robot on a floor, as an editable spec; names are its maker's, an actuator has its joint's."""
     config = config or RobotConfig()
     spec = mujoco.MjSpec()
-    spec.modelname = f"g1_{config.dof}dof"
+    spec.modelname = f"{ROBOT}_every_joint" if config.every_joint else ROBOT
     spec.compiler.degree = False
     spec.option.timestep = config.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.iterations = config.solver_iterations
     spec.option.ls_iterations = config.solver_iterations + 1
     _add_world(spec)
-    for name, facts in g1_bodies().items():
+    for name, facts in robot_bodies().items():
         parent = spec.worldbody if facts["parent"] == "world" else spec.body(facts["parent"])
         _add_body(parent, name, facts, config)
-    for joint in joints(config.dof):
+    for joint in joints(config.every_joint):
         _add_servo(spec, joint)
     _add_stand_keyframe(spec, config)
     return spec
@@ -103,15 +114,16 @@ def _add_body(parent: Any, name: str, facts: dict[str, Any], config: RobotConfig
     )
     if facts["parent"] == "world":
         body.add_freejoint(name="floating_base")
-    elif "joint" in facts and (config.dof == 29 or facts["joint"]["name"] not in WRIST_JOINTS):
-        joint = Joint(**facts["joint"])
+    elif "joint" in facts and (config.every_joint or facts["joint"]["name"] not in HELD_JOINTS):
+        joint = made_joint(facts["joint"])
         body.add_joint(
             name=joint.name,
             type=mujoco.mjtJoint.mjJNT_HINGE,
             axis=joint.axis,
             range=joint.range,
             armature=joint.armature,
-            frictionloss=config.frictionloss,
+            frictionloss=joint.frictionloss + config.frictionloss,
+            damping=[joint.damping, 0.0, 0.0],
         )
     for site in facts.get("sites", []):
         body.add_site(name=site["name"], pos=site["pos"])
@@ -121,17 +133,17 @@ def _add_body(parent: Any, name: str, facts: dict[str, Any], config: RobotConfig
         _add_geom(body, geom, config)
 
 
-def _sphere_sole(body: str) -> list[dict[str, Any]]:
-    side = body.split("_")[0]
+def _sphere_sole(foot: str) -> list[dict[str, Any]]:
+    side = FEET.index(foot)
     return [
         {
-            "name": f"{side}_foot{i}_collision",
+            "name": f"{SIDES[side]}_foot{i}_collision",
             "type": "sphere",
-            "size": [_SOLE_RADIUS],
+            "size": [SOLE_RADIUS],
             "pos": pos,
             "quat": [1, 0, 0, 0],
         }
-        for i, pos in enumerate(_SOLE_CORNERS, 1)
+        for i, pos in enumerate(SOLES[side], 1)
     ]
 
 
@@ -164,10 +176,10 @@ def _add_servo(spec: mujoco.MjSpec, joint: Joint) -> None:
 def _add_stand_keyframe(spec: mujoco.MjSpec, config: RobotConfig) -> None:
     model = spec.compile()
     data = mujoco.MjData(model)
-    pose = stand_pose(config.dof)
+    pose = stand_pose(config.every_joint)
     data.qpos[7:] = pose
     mujoco.mj_kinematics(model, data)
-    soles = [model.geom(f"{side}_foot{i}_collision").id for side in ("left", "right") for i in (1, 2, 3, 4)]
-    data.qpos[2] -= min(data.geom_xpos[soles, 2]) - _SOLE_RADIUS
+    soles = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name in FEET]
+    data.qpos[2] -= min(data.geom_xpos[soles, 2]) - SOLE_RADIUS
     spec.add_key(name="stand", qpos=data.qpos.copy(), ctrl=pose)
-    assert model.nu == len(joint_names(config.dof))
+    assert model.nu == len(joint_names(config.every_joint))

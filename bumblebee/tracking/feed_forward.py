@@ -12,12 +12,13 @@ import numpy as np
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.contacts import foot_contacts
 from bumblebee.motion.kinematics import sole_points
-from bumblebee.robot.facts import joints
+from bumblebee.robot.facts import columns, joints, limb
 from bumblebee.robot.model import build_model, gains
+from bumblebee.robot.written import SIDES
 
 _LARGEST = 1.0  # rad
 _SMOOTH = 5  # frames over which a change of the supporting foot is spread
-_LEG = {"left": range(0, 6), "right": range(6, 12)}  # columns of the legs' joints
+_LEG = {side: columns(limb(side, "foot")) for side in SIDES}  # columns of the legs' joints
 
 
 def lead_angles(clip: Clip) -> np.ndarray:

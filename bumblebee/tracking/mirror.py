@@ -10,7 +10,8 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import FEET, KEY_BODIES, joints
+from bumblebee.robot.facts import FEET, KEY_BODIES, PELVIS
+from bumblebee.robot.mirror import mirrored_joints, other_side
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.observing.terms import Part, parts
 
@@ -23,19 +24,10 @@ _AXIAL: Reflection = ([0, 1, 2], [-1.0, 1.0, -1.0])  # an angular velocity
 _COLUMNS: Reflection = ([0, 1, 2, 3, 4, 5], [1.0, -1.0, -1.0, 1.0, 1.0, -1.0])  # two columns of a rotation matrix
 
 
-def other_side(name: str) -> str:
-    """The name of what stands on the other side of the robot; of the trunk, the name itself."""
-    for side, other in (("left_", "right_"), ("right_", "left_")):
-        if name.startswith(side):
-            return other + name.removeprefix(side)
-    return name
-
-
 def joint_reflection() -> Reflection:
     """Reflection of values of the joints: sides exchanged, turns about x and z (roll, yaw) with the other sign."""
-    table = joints()
-    names = [joint.name for joint in table]
-    return [names.index(other_side(name)) for name in names], [1.0 if joint.axis[1] else -1.0 for joint in table]
+    index, sign = mirrored_joints()
+    return list(index), list(sign)
 
 
 def body_reflection(names: Sequence[str]) -> Reflection:
@@ -102,7 +94,7 @@ def _tensors(table: Reflection, device: torch.device | str) -> tuple[Tensor, Ten
 def _known() -> dict[Part, Reflection]:
     """Reflections of parts by name and size; look-ahead parts go by what follows their number."""
     turn, keys = joint_reflection(), body_reflection(KEY_BODIES)
-    but_pelvis = body_reflection([name for name in KEY_BODIES if name != "pelvis"])
+    but_pelvis = body_reflection([name for name in KEY_BODIES if name != PELVIS])
     polar = ("gravity_b", "root_lin_vel_b", "ref_lin_vel_b", "root_pos_b", "target_lin_vel_b")
     rotations = ("ref_rotation", "rotation", "root_rotation_g", "target_root_rotation_g", "target_root_rotation_b")
     turned = ("joint_pos", "joint_vel", "last_action", "ref_joint_pos", "ref_joint_vel", "torque")

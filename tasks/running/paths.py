@@ -8,6 +8,8 @@ RAW = Path("data/raw")
 """Where a user's motions and texts lie, a folder a set, kept by DVC."""
 RETARGETS = Path("data/retargets")
 """The cache of retargeted motions, by content."""
+ROBOT = Path("data/robot")
+"""The robot's folder: one that comes along, or the user's."""
 MOTIONS = Path("data/motions")
 """The library of all motions that could be read."""
 FILTERED = Path("data/filtered")

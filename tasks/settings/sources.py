@@ -5,6 +5,8 @@ from typing import Any
 
 from bumblebee.clustering.text import encoder_folder
 from bumblebee.errors import BadInput
+from bumblebee.learning import pretrained
+from bumblebee.robot.facts import ROBOT
 from tasks.running import paths
 from tasks.settings.filter_files import SHIPPED
 
@@ -20,6 +22,8 @@ def check_sources(found: dict[str, Any], path: Path) -> None:
         BadInput: naming the key.
     """
     motions, rollouts, ingest = found["motions"], found["rollouts"], found["ingest"]
+    if ROBOT != pretrained.THEIRS:
+        _require_own(found, path)
     if motions.source != "embedded":
         place, wanted = f"{path}: motions.source", "a folder of motions or 'embedded'"
         _require(_at_home(motions.source, place, wanted), place, wanted, either=True)
@@ -52,6 +56,19 @@ def check_sources(found: dict[str, Any], path: Path) -> None:
         _require(before, f"{path}: ingest.incoming", "a folder of measured rollouts")
     if ingest.model and not Path(ingest.model).is_file():
         raise BadInput(f"{path}: ingest.model", "an MJCF file", f"{ingest.model}: no such file")
+
+
+def _require_own(found: dict[str, Any], path: Path) -> None:
+    """Refuse what comes along for our G1 alone, of another robot's loop."""
+    needs = (
+        ("motions.source", found["motions"].source == "embedded", "a folder of motions", "make demo MOTIONS=<folder>"),
+        ("base.init", found["base"].init != "scratch", "scratch", "make demo PROFILE=world_model_gpu"),
+        ("filter.policy.source", found["filter"].policy.source == SHIPPED, "an exported policy's folder", ""),
+    )
+    for key, wrong, wanted, do in needs:
+        if wrong:
+            came = f"what comes along for {pretrained.THEIRS}, and this is {ROBOT}"
+            raise BadInput(f"{path}: {key}", wanted, came, do)
 
 
 def _require(place: Path, key: str, wanted: str, either: bool = False) -> None:

@@ -147,7 +147,7 @@ def test_text_in_a_number_column_is_named_with_its_row(tmp_path: Path) -> None:
 def asap_file(path: Path, rollout: Rollout, lin_vel: np.ndarray, joints: int = 29) -> None:
     """A log as ASAP's logger writes it, 29 joints of which 23 are the model's."""
     wide = {name: np.zeros((rollout.frames, joints)) for name in ("joint_pos", "joint_vel", "joint_target")}
-    keep = [i for i, name in enumerate(joint_names(29)) if name in rollout.joints]
+    keep = [i for i, name in enumerate(joint_names(every=True)) if name in rollout.joints]
     for name, values in wide.items():
         values[:, keep] = getattr(rollout, name)
     np.savez(

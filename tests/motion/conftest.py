@@ -45,7 +45,7 @@ class Motions:
     def csv(self, raw: RawMotion, name: str = "sway.csv", dof: int = 29, header: str = "", order: str = "xyzw") -> Path:
         joints = np.zeros((len(raw.root_pos), dof))
         for column, joint in enumerate(joint_names()):
-            joints[:, joint_names(dof).index(joint)] = raw.joint_pos[:, column]
+            joints[:, joint_names(every=dof == 29).index(joint)] = raw.joint_pos[:, column]
         quat = raw.root_quat[:, ["wxyz".index(axis) for axis in order]]
         path = self.folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -77,7 +77,9 @@ def pose_of(raw: RawMotion, dof: int = 23, extended: int = 3) -> np.ndarray:
     pose = np.zeros((len(raw.root_pos), 1 + dof + extended, 3))
     pose[:, 0] = quaternions.rotation_vector(raw.root_quat)
     for column, joint in enumerate(joints()):
-        pose[:, 1 + joint_names(dof).index(joint.name)] = raw.joint_pos[:, column, None] * np.array(joint.axis)
+        pose[:, 1 + joint_names(every=dof == 29).index(joint.name)] = raw.joint_pos[:, column, None] * np.array(
+            joint.axis
+        )
     return pose
 
 

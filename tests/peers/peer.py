@@ -8,7 +8,7 @@ import yaml
 
 from bumblebee.robot.facts import joint_names
 
-JOINTS = tuple(reversed(joint_names(29)))
+JOINTS = tuple(reversed(joint_names(every=True)))
 ANKLE = "left_ankle_roll_joint"
 
 

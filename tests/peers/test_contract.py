@@ -30,12 +30,12 @@ def refused(*arguments: Any) -> str:
 
 def test_the_width_is_the_sum_of_the_blocks(tmp_path: Path):
     contract = read_contract(write_contract(tmp_path / "c.yaml"))
-    assert (contract.width, contract.dof, contract.action.scale) == (WIDTH, 29, (0.5,))
+    assert (contract.width, contract.every_joint, contract.action.scale) == (WIDTH, True, (0.5,))
 
 
 def test_without_wrists_it_is_a_policy_of_23_joints(tmp_path: Path):
     short = {name: table()[name][:23] for name in ("default_pos", "kp", "kd")}
-    assert read_contract(write_contract(tmp_path / "c.yaml", joints=list(joint_names()), **short)).dof == 23
+    assert not read_contract(write_contract(tmp_path / "c.yaml", joints=list(joint_names()), **short)).every_joint
 
 
 @pytest.mark.parametrize("field", ["robot", "name", "joints", "default_pos", "kp", "kd", "action", "groups", "input"])

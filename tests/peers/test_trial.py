@@ -73,8 +73,8 @@ def test_gains_and_model_are_chosen_apart(tmp_path: Path):
 @pytest.mark.parametrize("dof", [23, 29])
 def test_joints_go_by_name_and_what_is_not_there_stands_at_zero(tmp_path: Path, dof: int):
     order = JointOrder(read_contract(write_contract(tmp_path / "c.yaml")), dof)
-    numbers = {name: float(i + 1) for i, name in enumerate(joint_names(29))}
-    model, motion = joint_names(dof), joint_names()
+    numbers = {name: float(i + 1) for i, name in enumerate(joint_names(every=True))}
+    model, motion = joint_names(every=dof == 29), joint_names()
     values = {names: torch.tensor([[numbers[name] for name in names]]) for names in {model, motion, JOINTS}}
     seen = order.seen(state(joint_pos=values[model], joint_vel=values[model])).joint_pos[0].tolist()
     assert seen == [numbers[name] if name in model else 0.0 for name in JOINTS]
@@ -98,7 +98,7 @@ def test_servos_are_told_the_default_and_the_clipped_output(tmp_path: Path):
     next(iter(roll_out_peer(peer, MotionLibrary([clip], ()), engine)))
     output = np.clip(weight[0] * clip.root_pos[1, 2], -2.0, 2.0)
     wanted = dict(zip(JOINTS, np.array(peer.contract.default_pos) + 0.5 * output, strict=True))
-    told = [wanted[name] for name in joint_names(29)]
+    told = [wanted[name] for name in joint_names(every=True)]
     assert np.allclose(engine.batch.ctrl[0], told, atol=1e-5)
 
 

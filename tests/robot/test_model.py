@@ -6,21 +6,21 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.robot.facts import g1_bodies, joint_names, joints
+from bumblebee.robot.facts import joint_names, joints, robot_bodies
 from bumblebee.robot.model import RobotConfig, build_model, gains, write_xml
 
 
 @pytest.mark.parametrize(("dof", "nq"), [(23, 30), (29, 36)])
 def test_sizes_and_order(dof: int, nq: int) -> None:
-    model = build_model(RobotConfig(dof=dof))
+    model = build_model(RobotConfig(every_joint=dof == 29))
     assert (model.nq, model.nv, model.nu) == (nq, nq - 1, dof)
-    assert tuple(model.joint(i + 1).name for i in range(dof)) == joint_names(dof)
-    assert tuple(model.actuator(i).name for i in range(dof)) == joint_names(dof)
+    assert tuple(model.joint(i + 1).name for i in range(dof)) == joint_names(every=dof == 29)
+    assert tuple(model.actuator(i).name for i in range(dof)) == joint_names(every=dof == 29)
 
 
 def test_mass_is_the_tables() -> None:
     """Collision primitives add nothing to the declared inertias."""
-    assert build_model().body_mass.sum() == pytest.approx(sum(b["mass"] for b in g1_bodies().values()))
+    assert build_model().body_mass.sum() == pytest.approx(sum(b["mass"] for b in robot_bodies().values()))
 
 
 def test_servo_law() -> None:

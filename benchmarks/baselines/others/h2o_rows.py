@@ -13,14 +13,14 @@ from benchmarks.baselines.others.library import key_vel_w
 from benchmarks.baselines.others.memory import FOOT_KEYS
 from benchmarks.baselines.others.scoring import Judged, Row
 from bumblebee.peers.geometry import head_pos_w
-from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.robot.facts import BODY_OF, KEY_BODIES
 from bumblebee.sim.rotations import angle_between, rotate, rotate_inverse
 
 LOWER = 7
 """Key bodies before this one are of the lower body."""
 LEGS = 12
 """Joints before this one are of the legs."""
-HANDS = (KEY_BODIES.index("left_wrist_yaw_link"), KEY_BODIES.index("right_wrist_yaw_link"))
+HANDS = (KEY_BODIES.index(BODY_OF["left_hand"]), KEY_BODIES.index(BODY_OF["right_hand"]))
 FOOT_HEIGHT = 0.25  # m
 AIR_TIME = 0.25  # s
 MOVING = 0.1  # m/s

@@ -18,6 +18,8 @@ MOTIONS = {FOLDER: _REAL, RANDOMISED: f"{_REAL}, {_CMU}", IMU: f"{_REAL}, {_CMU}
 """Real motions that each has learnt from, with licences that whatever goes on from its weights keeps."""
 SHIPPED = {"shipped": FOLDER, "randomised": RANDOMISED, "imu": IMU}
 """Names by which a user asks for them."""
+THEIRS = "g1_23dof"
+"""The robot of all three."""
 NO_POLICY = f"Train it first, or take one that comes along: {', '.join(SHIPPED)}."
 
 

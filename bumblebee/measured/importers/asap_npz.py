@@ -160,7 +160,7 @@ def _gains(where: str, values: np.ndarray, joints: int) -> np.ndarray:
 
 def _default_joints(where: str, model: mujoco.MjModel, width: int) -> tuple[str, ...]:
     actuated = driven_joints(model)
-    for names in (actuated, joint_names(29), joint_names(23)):
+    for names in (actuated, joint_names(every=True), joint_names()):
         if len(names) == width:
             return names
     raise BadInput(

@@ -12,7 +12,7 @@ import numpy as np
 
 from bumblebee import quaternions
 from bumblebee.motion.kinematics import forward_bodies
-from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.facts import joint_names, robot_bodies
 
 Poses = dict[str, tuple[np.ndarray, np.ndarray]]
 
@@ -76,13 +76,13 @@ def _joined(first: str, second: str) -> bool:
 
 def _piece(body: str) -> str:
     """The first body of the rigid piece that a body belongs to: up the tree to the next hinge that moves."""
-    facts = g1_bodies()[body]
+    facts = robot_bodies()[body]
     moves = facts.get("joint", {"name": ""})["name"] in joint_names()
     return body if moves or facts["parent"] == "world" else _piece(facts["parent"])
 
 
 def _parent_piece(piece: str) -> str:
-    parent = g1_bodies()[piece]["parent"]
+    parent = robot_bodies()[piece]["parent"]
     return "" if parent == "world" else _piece(parent)
 
 
@@ -90,7 +90,7 @@ def _links(poses: Poses) -> dict[str, Links]:
     """The bodies that have primitives."""
     found = {}
     for name, (pos, quat) in poses.items():
-        if "collision" in g1_bodies()[name]:
+        if "collision" in robot_bodies()[name]:
             starts, ends, radii, centre, reach = _primitives(name)
             corners = np.concatenate([starts, ends, centre[None]])
             placed = pos[:, None] + quaternions.rotate(quat[:, None], corners[None])
@@ -102,7 +102,7 @@ def _links(poses: Poses) -> dict[str, Links]:
 def _primitives(body: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
     """Ends of a body's segments (N, 3) twice [m, body], radii (N,) [m]; middle (3,) and radius of a ball around all."""
     starts, ends, radii = [], [], []
-    for geom in g1_bodies()[body]["collision"]:
+    for geom in robot_bodies()[body]["collision"]:
         half = geom["size"][1] if geom["type"] == "capsule" else 0.0
         reach = quaternions.rotate(geom["quat"], [0.0, 0.0, half])
         starts.append(np.asarray(geom["pos"]) - reach)

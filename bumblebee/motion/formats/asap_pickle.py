@@ -16,7 +16,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
 from bumblebee.motion.formats import safe_pickle
 from bumblebee.motion.formats.config import RobotConfig
-from bumblebee.motion.formats.layouts import arranged, layout_of, layouts, notes_of, require_joints
+from bumblebee.motion.formats.layouts import arranged, layout_of, layouts, notes_of, require_joints, sizes
 from bumblebee.motion.formats.others import refuse_known
 from bumblebee.motion.raw import RawMotion, as_wxyz
 from bumblebee.motion.reading.remedy import say
@@ -89,7 +89,7 @@ def _robot_pose(motion: dict) -> np.ndarray | None:
 
 
 def _dof(bodies: int) -> int | None:
-    return next((dof for dof in (23, 29) if bodies in (1 + dof, 1 + dof + _EXTENDED)), None)
+    return next((dof for dof in sizes()[::-1] if bodies in (1 + dof, 1 + dof + _EXTENDED)), None)
 
 
 def _bounded(path: Path, motions: dict) -> None:
@@ -134,7 +134,7 @@ def _joint_angles(where: str, motion: dict, options: RobotConfig) -> tuple[np.nd
     if _field(motion, "joint_pos") is None and pose is not None:
         names, angles = _of_pose(where, pose)
         return arranged(angles, names), ("joint angles from pose_aa", *notes_of(names))
-    values = _matrix(where, motion, "joint_pos", (23, 29))
+    values = _matrix(where, motion, "joint_pos", sizes()[::-1])
     names = _joint_names(where, motion, values.shape[1], options)
     return arranged(values, names), notes_of(names)
 
@@ -158,9 +158,9 @@ def _joint_names(where: str, motion: dict, dof: int, options: RobotConfig) -> tu
 def _of_pose(where: str, pose: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
     """The joints about whose axes `pose_aa` turns, and their angles (T, n) [rad]."""
     pose = require_real(f"{where}, pose_aa", pose)
-    axes = {joint.name: joint.axis for joint in joints(29)}
+    axes = {joint.name: joint.axis for joint in joints(every=True)}
     found = []
-    for names in layouts(_dof(pose.shape[1]) or 23).values():
+    for names in layouts(_dof(pose.shape[1]) or sizes()[-1]).values():
         turned, about = pose[:, 1 : 1 + len(names)], np.array([axes[name] for name in names])
         with np.errstate(all="ignore"):  # what is no number is named by the checks of every motion
             angles = (turned * about).sum(axis=2)

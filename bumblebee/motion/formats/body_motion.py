@@ -7,7 +7,7 @@ import numpy as np
 from bumblebee import quaternions
 from bumblebee.motion.clip import Clip, velocities
 from bumblebee.motion.kinematics import forward_bodies
-from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.facts import joint_names, robot_bodies
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ def body_motion(clip: Clip) -> BodyMotion:
     rates = velocities(clip)
     linear: dict[str, np.ndarray] = {}
     angular: dict[str, np.ndarray] = {}
-    for name, facts in g1_bodies().items():
+    for name, facts in robot_bodies().items():
         pos, quat = poses[name]
         if facts["parent"] not in poses:
             linear[name] = rates.root_lin_vel_w.astype(np.float64)
@@ -39,7 +39,7 @@ def body_motion(clip: Clip) -> BodyMotion:
         above = facts["parent"]
         linear[name] = linear[above] + _cross(angular[above], pos - poses[above][0])
         angular[name] = angular[above] + _turning(facts, quat, rates.joint_vel)
-    order = list(g1_bodies())
+    order = list(robot_bodies())
     stacked = [np.stack([poses[name][part] for name in order], axis=1) for part in (0, 1)]
     return BodyMotion(*stacked, *(np.stack([of[name] for name in order], axis=1) for of in (linear, angular)))
 

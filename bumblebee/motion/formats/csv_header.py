@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.config import RobotConfig
-from bumblebee.motion.formats.layouts import layout_of, notes_of, require_joints
+from bumblebee.motion.formats.layouts import layout_of, notes_of, require_joints, sizes
 from bumblebee.motion.raw import is_order
 from bumblebee.motion.reading.remedy import say
 from bumblebee.robot.facts import joint_names
@@ -68,11 +68,11 @@ class CsvLayout:
 
 def bare_layout(where: object, width: int, options: RobotConfig) -> CsvLayout:
     """The layout of a file without a header, by its number of columns."""
-    for dof in (29, 23):
+    for dof in sizes():
         if width == _QUATERNION + dof:
             names = layout_of(where, dof, options.joints_23)
             return CsvLayout((0, 1, 2), (3, 4, 5, 6), _QUATERNION, names, width, **_order("", options))
-    wanted = "36 columns (xyz, quaternion xyzw, 29 joints), or 30 with 23 joints"
+    wanted = " or ".join(f"{_QUATERNION + n} columns (xyz, quaternion xyzw, {n} joints)" for n in sizes())
     raise BadInput(where, wanted, f"{width} column{'s' * (width != 1)}")
 
 
@@ -85,7 +85,7 @@ def header_layout(path: Path, cells: list[str], options: RobotConfig) -> CsvLayo
         options: units and orders where the names do not say them.
     """
     names = [cell.strip().strip('"').lower() for cell in cells]
-    first = next((column for column, name in enumerate(names) if _joint(name) in joint_names(29)), len(names))
+    first = next((column for column, name in enumerate(names) if _joint(name) in joint_names(every=True)), len(names))
     counter = 0 if names[0] in _COUNTERS else None
     start = 0 if counter is None else 1
     joints = _joints(path, cells, first)

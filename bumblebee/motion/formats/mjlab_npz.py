@@ -14,7 +14,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
 from bumblebee.motion.formats.config import RobotConfig
-from bumblebee.motion.formats.layouts import arranged, layouts, notes_of, require_joints
+from bumblebee.motion.formats.layouts import arranged, layouts, notes_of, require_joints, sizes
 from bumblebee.motion.formats.orders import BREADTH, DEPTH, body_orders, demand, detect, joint_order
 from bumblebee.motion.rates import RATES, rate_in
 from bumblebee.motion.raw import RawMotion, as_wxyz
@@ -85,10 +85,11 @@ def _joints(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, tupl
     values = arrays["joint_pos"]
     where = f"{path}, joint_pos"
     if values.ndim != 2 or values.shape[1] not in (23, 29, _ROOT + 23, _ROOT + 29) or not len(values):
-        wanted = "shape (T, 29) or (T, 23) with at least a frame, or 7 columns more with the root first"
+        known = " or ".join(f"(T, {count})" for count in sizes())
+        wanted = f"shape {known} with at least a frame, or 7 columns more with the root first"
         raise BadInput(where, wanted, str(values.shape)[:80])
     values = require_real(where, values)
-    if values.shape[1] in (23, 29):
+    if values.shape[1] in sizes():
         return values, None
     return values[:, _ROOT:], (values[:, :3], values[:, 3:_ROOT])
 

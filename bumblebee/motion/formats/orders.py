@@ -15,7 +15,7 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.formats.layouts import arranged
 from bumblebee.motion.kinematics import forward_bodies
 from bumblebee.motion.reading.remedy import say
-from bumblebee.robot.facts import KEY_BODIES, g1_bodies
+from bumblebee.robot.facts import HELD_JOINTS, KEY_BODIES, PELVIS, path_to, robot_bodies
 
 NEAR = 0.03  # m: mean distance of a file's bodies from ours; other editions of the G1's model differ by millimetres
 _APART = 2.0  # so many times worse must the next best order be
@@ -45,7 +45,7 @@ class Order:
 def breadth_first() -> tuple[str, ...]:
     """Names of the 30 bodies as Isaac orders them, the pelvis first."""
     below: dict[str, list[str]] = {}
-    for name, facts in g1_bodies().items():
+    for name, facts in robot_bodies().items():
         below.setdefault(facts["parent"], []).append(name)
     found, level = [], below["world"]
     while level:
@@ -57,14 +57,14 @@ def breadth_first() -> tuple[str, ...]:
 @cache
 def joint_order(kind: str, layout: tuple[str, ...]) -> tuple[str, ...]:
     """The joints of a layout depth-first or breadth-first."""
-    bodies = breadth_first() if kind == BREADTH else tuple(g1_bodies())
-    names = (g1_bodies()[body]["joint"]["name"] for body in bodies if "joint" in g1_bodies()[body])
+    bodies = breadth_first() if kind == BREADTH else tuple(robot_bodies())
+    names = (robot_bodies()[body]["joint"]["name"] for body in bodies if "joint" in robot_bodies()[body])
     return tuple(name for name in names if name in layout)
 
 
 def body_orders(count: int) -> dict[str, tuple[str, ...]]:
     """Known lists of so many bodies; MuJoCo's may begin with the world."""
-    depth = tuple(g1_bodies())
+    depth = tuple(robot_bodies())
     known = {
         "depth-first": depth,
         "breadth-first": breadth_first(),
@@ -96,7 +96,7 @@ def detect(
     some = np.unique(np.linspace(0, len(joints) - 1, _FRAMES).round().astype(int))
     with np.errstate(all="ignore"):
         found = sorted(_candidates(joints[some], body_pos[some], body_quat[some], named), key=lambda o: o.error)
-    known = f"G1 bodies in a known order ({len(g1_bodies())} depth-first or breadth-first, or the 14 tracked ones)"
+    known = f"G1 bodies in a known order ({len(robot_bodies())} depth-first or breadth-first, or the 14 tracked ones)"
     if not found:
         raise BadInput(f"{where}, body_pos_w", known, f"{body_pos.shape[1]} bodies")
     best = found[0]
@@ -133,20 +133,27 @@ def _candidates(
     for kind, names in named.items():
         angles = arranged(joints, names)
         for bodies, order in body_orders(body_pos.shape[1]).items():
-            root = order.index("pelvis")
+            root = order.index(PELVIS)
             for quaternion in ("wxyz", "xyzw"):
                 quat = body_quat[:, root][:, [quaternion.index(part) for part in "wxyz"]]
                 error = _distance(body_pos, order, forward_bodies(body_pos[:, root], quat, angles))
                 yield Order(kind, bodies, root, quaternion, error, names)
 
 
+@cache
+def _beyond_held(body: str) -> bool:
+    """Whether a joint that is held still here, and may turn in the file, moves the body's place."""
+    above = (robot_bodies()[name].get("joint", {}).get("name") for name in path_to(body)[:-1])
+    return any(joint in HELD_JOINTS for joint in above)
+
+
 def _distance(body_pos: np.ndarray, order: tuple[str, ...], poses: dict) -> float:
-    """Mean distance of the bodies over the frames without NaN [m]; those beyond the wrists turn by joints not read."""
+    """Mean distance of the bodies over the frames without NaN [m]; those beyond held joints do not count."""
     distances = np.stack(
         [
             np.linalg.norm(body_pos[:, column] - poses[name][0], axis=1)
             for column, name in enumerate(order)
-            if name != "world" and not name.endswith(("wrist_pitch_link", "wrist_yaw_link"))
+            if name != "world" and not _beyond_held(name)
         ]
     )
     whole = np.isfinite(distances).all(axis=0)

@@ -18,14 +18,16 @@ from bumblebee.robot.facts import joint_names, joints
 _EXTENDED = 3  # bodies without a joint at the end of ASAP's `pose_aa`: both hands and the head
 
 
-def g1_csv(clip: Clip, dof: int = 29) -> bytes:
+def g1_csv(clip: Clip, every: bool = True) -> bytes:
     """Rows of xyz [m], quaternion xyzw and 29 joints [rad] in Unitree's order, wrists 0; no header, no rate.
 
     Args:
         clip: the motion.
-        dof: 29, or 23 for files without the wrists.
+        every: with the joints that are held still here, at 0; else those that are actuated alone.
     """
-    table = np.concatenate([clip.root_pos, clip.root_quat[:, [1, 2, 3, 0]], wide(clip.joint_pos, dof)], axis=1)
+    table = np.concatenate(
+        [clip.root_pos, clip.root_quat[:, [1, 2, 3, 0]], wide(clip.joint_pos) if every else clip.joint_pos], axis=1
+    )
     stream = io.StringIO()
     np.savetxt(stream, table, fmt="%.9g", delimiter=",")  # nine digits are a float32, bit for bit
     return stream.getvalue().encode()
@@ -66,8 +68,8 @@ def mjlab_npz(clip: Clip) -> bytes:
     """
     bodies = body_motion(clip)
     arrays = {
-        "joint_pos": wide(clip.joint_pos, 29),
-        "joint_vel": wide(velocities(clip).joint_vel, 29),
+        "joint_pos": wide(clip.joint_pos),
+        "joint_vel": wide(velocities(clip).joint_vel),
         "body_pos_w": bodies.pos,
         "body_quat_w": bodies.quat,
         "body_lin_vel_w": bodies.lin_vel,
@@ -81,10 +83,11 @@ def mjlab_npz(clip: Clip) -> bytes:
     return stream.getvalue()
 
 
-def wide(values: np.ndarray, dof: int) -> np.ndarray:
-    """(T, 23) joint values as (T, `dof`) in Unitree's order, 0 for the wrists."""
-    out = np.zeros((len(values), dof), values.dtype)
-    out[:, [joint_names(dof).index(name) for name in joint_names()]] = values
+def wide(values: np.ndarray) -> np.ndarray:
+    """(T, J) values of the actuated joints as those of every joint, 0 for the ones held still (the G1's wrists)."""
+    every = joint_names(every=True)
+    out = np.zeros((len(values), len(every)), values.dtype)
+    out[:, [every.index(name) for name in joint_names()]] = values
     return out
 
 

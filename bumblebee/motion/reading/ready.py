@@ -22,6 +22,7 @@ from bumblebee.motion.resample import resample
 from bumblebee.motion.retarget.refit import VERSION as REFIT
 from bumblebee.motion.retarget.refit import refit
 from bumblebee.motion.retarget.retarget import VERSION, retarget
+from bumblebee.robot.facts import IDENTITY
 
 _READER = 3  # version of the readers, like those of the methods part of a cached result's key
 
@@ -107,6 +108,7 @@ def _key(job: Job, config: ReadConfig) -> str:
         "grounding": asdict(config.grounding),
         "retarget": asdict(config.retarget),
         "bodies": model_files() if job.path.suffix.lower() == ".npz" else [],
+        "body": IDENTITY,
         "version": [VERSION, REFIT, _READER],
     }
     return key_of(parts)

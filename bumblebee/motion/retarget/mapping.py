@@ -1,9 +1,8 @@
 """Which point of a robot stands for which landmark of a person: a small YAML file beside the robot's MJCF."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,11 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.io.read import parse_yaml, read_text
 from bumblebee.motion.retarget.tree import Tree, points, poses, tree_of
-from bumblebee.robot.facts import joints, stand_pose
+from bumblebee.robot.facts import BODY_OF, joints, stand_pose
+from bumblebee.robot.folder import chosen
 from bumblebee.robot.model import RobotConfig, build_model
+from bumblebee.robot.written import SIDES, Vector
 
-SIDES = ("left", "right")
 LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 POINTS = (*(f"{side}_{limb}" for side in SIDES for limb in LIMBS), "neck")
 """Landmarks that a mapping places on the robot, in the order of `Robot.body`."""
@@ -54,12 +54,33 @@ class Robot:
 
 
 @cache
-def g1() -> Robot:
-    """The G1 with its wrists locked, as all of BumbleBee has it."""
+def this_robot() -> Robot:
+    """The robot of this process, with what its folder holds still locked."""
     model = build_model(RobotConfig(feet="capsules"))
-    text = files("bumblebee.motion.retarget").joinpath("robots/g1.yaml").read_text()
     speeds = np.array([joint.velocity_limit for joint in joints()])
-    return make_robot("g1.yaml", parse_yaml("g1.yaml", text), model, speeds, stand_pose())
+    return make_robot("robot.yaml", own_mapping(), model, speeds, stand_pose())
+
+
+def own_mapping() -> dict[str, Any]:
+    """The mapping that a robot's folder says: a limb's key bodies and the corners that reach the floor."""
+    said = chosen().written
+    ends = {"ankle": "foot", "wrist": "hand"}
+    bodies = {f"{side}_{limb}": BODY_OF[f"{side}_{ends.get(limb, limb)}"] for side in SIDES for limb in LIMBS}
+    soles = {
+        side: [
+            BODY_OF[f"{side}_foot"],
+            [list(corner) for corner in _heel_first(said.reach.get(side, said.soles[side]))],
+        ]
+        for side in SIDES
+    }
+    neck = [said.neck[0], list(said.neck[1])]
+    return {"robot": said.robot, "points": {**bodies, "neck": neck}, "soles": soles, "sole_radius": said.sole_radius}
+
+
+def _heel_first(corners: Sequence[Vector]) -> list[Vector]:
+    """Corners of a sole as heel left, heel right, toe left, toe right."""
+    along = sorted(corners)
+    return [corner for pair in (along[:2], along[2:]) for corner in sorted(pair, key=lambda one: -one[1])]
 
 
 def read_robot(model: Path, mapping: Path) -> Robot:

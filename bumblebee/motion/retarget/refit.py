@@ -16,7 +16,7 @@ from bumblebee.motion.kinematics import lowest
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.contacts import stance
-from bumblebee.motion.retarget.mapping import CORNERS, POINTS, SIDES, Robot, g1
+from bumblebee.motion.retarget.mapping import CORNERS, POINTS, SIDES, Robot, this_robot
 from bumblebee.motion.retarget.retarget import fit, root_quat
 from bumblebee.motion.retarget.targets import SEGMENTS, Targets
 from bumblebee.motion.retarget.tree import points, poses
@@ -39,7 +39,11 @@ def refit(raw: RawMotion, grounding: GroundingConfig, config: RetargetConfig) ->
     floor = floor_height(lowest(raw.root_pos, raw.root_quat, raw.joint_pos), raw.fps, grounding)
     if np.abs(floor).max() <= grounding.tolerance or len(raw.root_pos) < LEAST:
         return raw
-    at = fit(own_targets(raw, floor, g1(), grounding, config), g1(), replace(config, posture=config.refit_posture))
+    at = fit(
+        own_targets(raw, floor, this_robot(), grounding, config),
+        this_robot(),
+        replace(config, posture=config.refit_posture),
+    )
     change = np.abs(at.joint - raw.joint_pos)
     note = f"the floor was taken out by up to {np.abs(floor).max():.2f} m"
     note += f"; joint angles changed by {change.mean():.3f} rad on average, {change.max():.2f} at most"

@@ -10,7 +10,7 @@ from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.retarget.branch import far_note, solve_near
 from bumblebee.motion.retarget.config import RetargetConfig
-from bumblebee.motion.retarget.mapping import SIDES, Robot, g1
+from bumblebee.motion.retarget.mapping import SIDES, Robot, this_robot
 from bumblebee.motion.retarget.solve import Trajectory
 from bumblebee.motion.retarget.targets import Targets, at_rate, targets
 from bumblebee.robot.facts import joint_names
@@ -35,10 +35,10 @@ def retarget(motion: HumanMotion, fps: float = 50.0, config: RetargetConfig | No
         BadInput: fewer frames than an acceleration needs, NaN, legs without length.
     """
     config = config or RetargetConfig()
-    target = aim(motion, g1(), fps, config)
-    at = fit(target, g1(), config)
-    assert g1().tree.joints == joint_names()
-    notes = (*motion.notes, *fit_notes(at, target, g1(), config))
+    target = aim(motion, this_robot(), fps, config)
+    at = fit(target, this_robot(), config)
+    assert this_robot().tree.joints == joint_names()
+    notes = (*motion.notes, *fit_notes(at, target, this_robot(), config))
     return RawMotion(
         motion.name, fps, at.root, root_quat(at), at.joint, motion.file, motion.first_row, motion.part, notes
     )

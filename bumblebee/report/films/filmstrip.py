@@ -14,17 +14,17 @@ from PIL import Image
 from bumblebee.measured.rollout import Rollout
 from bumblebee.report.charts.figures import GRID, canvas, colour, image_uri, svg_uri
 from bumblebee.report.films.render import render_frames
-from bumblebee.robot.facts import KEY_BODIES, joint_names
+from bumblebee.robot.facts import BODY_OF, KEY_BODIES, PELVIS, TORSO, joint_names
+from bumblebee.robot.written import SIDES
 
 _BONES = (
-    ("pelvis", "left_hip_roll_link", "left_knee_link", "left_ankle_roll_link"),
-    ("pelvis", "right_hip_roll_link", "right_knee_link", "right_ankle_roll_link"),
-    ("pelvis", "torso_link"),
-    ("torso_link", "left_shoulder_roll_link", "left_elbow_link", "left_wrist_yaw_link"),
-    ("torso_link", "right_shoulder_roll_link", "right_elbow_link", "right_wrist_yaw_link"),
+    *((PELVIS, *(BODY_OF[f"{side}_{part}"] for part in ("hip", "knee", "foot"))) for side in SIDES),
+    (PELVIS, TORSO),
+    *((TORSO, *(BODY_OF[f"{side}_{part}"] for part in ("shoulder", "elbow", "hand"))) for side in SIDES),
 )
 
 
+_LEFT = {body for role, body in BODY_OF.items() if role.startswith("left_")}
 _COLUMNS = 9
 _GAP = 8  # pixels between two films side by side
 
@@ -140,7 +140,7 @@ def _stick_stills(qpos: np.ndarray, model_xml: str) -> list[str]:
         figure, axis = canvas(height=1.9, width=1.7)
         for bone in _BONES:
             points = np.array([at[name] for name in bone])
-            shade = colour(1) if "left" in bone[-1] else colour(0)
+            shade = colour(1) if bone[-1] in _LEFT else colour(0)
             axis.plot(points[:, 1] * 0.8 + points[:, 0] * 0.6, points[:, 2], "-o", ms=2.5, color=shade, lw=1.8)
         for height in (0.0, 0.5, 1.0):
             axis.axhline(height, color=GRID, zorder=0)

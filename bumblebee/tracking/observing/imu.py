@@ -7,16 +7,16 @@ which an IMU gives; its heading is the gyro's, integrated, and drifts. The suffi
 import torch
 from torch import Tensor
 
-from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.robot.facts import KEY_BODIES, PELVIS, joint_names
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, turned, two_columns
 from bumblebee.tracking.sampling.library import ReferenceFrame
 
-_PELVIS = KEY_BODIES.index("pelvis")
+_PELVIS = KEY_BODIES.index(PELVIS)
 _OTHERS = len(KEY_BODIES) - 1
 
 
-def imu_layout(joints: int = 23, ahead: int = 0) -> list[tuple[str, int]]:
+def imu_layout(joints: int = len(joint_names()), ahead: int = 0) -> list[tuple[str, int]]:
     """Names and sizes of the parts in order; `ahead` is the number of further reference frames."""
     parts = [
         ("gravity_b", 3),

@@ -8,7 +8,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.robot.facts import KEY_BODIES, joint_names
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import from_rotation_vector, multiply, rotate
 from bumblebee.tracking.observing.terms import see
@@ -25,7 +25,7 @@ READINGS = {
 """Readings that a policy may need, each explained."""
 
 
-def needed(terms: Sequence[str], joints: int = 23, ahead: int = 0) -> tuple[str, ...]:
+def needed(terms: Sequence[str], joints: int = len(joint_names()), ahead: int = 0) -> tuple[str, ...]:
     """Names of the `READINGS` that an observation of these terms, sets replaced by theirs, depends on."""
     return _needed(tuple(terms), joints, ahead)
 

@@ -7,16 +7,16 @@ kinematics; nothing depends on the heading or the place in the world (paper, sec
 import torch
 from torch import Tensor
 
-from bumblebee.robot.facts import KEY_BODIES, joints, stand_pose
+from bumblebee.robot.facts import KEY_BODIES, PELVIS, joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, turned, two_columns
 from bumblebee.tracking.sampling.library import ReferenceFrame
 
-_PELVIS = KEY_BODIES.index("pelvis")
+_PELVIS = KEY_BODIES.index(PELVIS)
 
 
-def layout(joints: int = 23, ahead: int = 0) -> list[tuple[str, int]]:
+def layout(joints: int = len(joint_names()), ahead: int = 0) -> list[tuple[str, int]]:
     """Names and sizes of the parts of the observation in order; `ahead` is the number of further reference frames."""
     keys = len(KEY_BODIES)
     parts = [

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.robot.facts import KEY_BODIES, joint_names
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, multiply, turned
 from bumblebee.tracking.observing.imu import imu_layout, observe_imu
@@ -257,7 +257,7 @@ def expanded(terms: Sequence[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def parts(terms: Sequence[str], joints: int = 23, ahead: int = 0) -> list[Part]:
+def parts(terms: Sequence[str], joints: int = len(joint_names()), ahead: int = 0) -> list[Part]:
     """Names and sizes of the parts of one control step, in order; `ahead` counts further reference frames."""
     out: list[Part] = []
     for name in expanded(terms):

@@ -17,10 +17,11 @@ import mujoco
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.robot.facts import TORSO
 from bumblebee.sim.engine import Engine
 from bumblebee.tracking.config import Randomisation
 
-BASE = "torso_link"
+BASE = TORSO
 """The body whose centre of mass `base_com` shifts."""
 
 

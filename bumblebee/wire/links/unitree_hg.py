@@ -18,10 +18,10 @@ _ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", *_WRIST)
 _PARTS = (("left_", _LEG), ("right_", _LEG), ("waist_", ("yaw", "roll", "pitch")), ("left_", _ARM), ("right_", _ARM))
 MOTORS = tuple(f"{side}{name}_joint" for side, names in _PARTS for name in names)
 """Joints of a G1 with 29 motors, in the order of its slots; the ankles and the waist in series (mode_pr 0)."""
-OURS = np.array([MOTORS.index(name) for name in joint_names()])
-"""(23,) slot of each of our joints."""
+OURS = np.array([MOTORS.index(name) for name in joint_names() if name in MOTORS])
+"""(J,) slot of each of our joints; fewer than these of a robot that is no G1, which no end of this link serves."""
 HELD = np.setdiff1d(np.arange(len(MOTORS)), OURS)
-"""(6,) slots of the wrists."""
+"""Slots of the motors that are held: of the 23-joint G1 the six of its wrists."""
 SERIES = 0
 """mode_pr: ankles by pitch and roll, not by their two motors."""
 

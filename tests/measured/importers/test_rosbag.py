@@ -87,7 +87,7 @@ def test_unitree_s_low_states_and_commands_give_a_rollout_for_each_set_of_gains(
     ramp = np.clip((np.arange(rows) - 75) / 25, 0, 1)[:, None]
     kp = (20 + 40 * ramp) * np.ones((rows, joints))
     write_mcap(tmp_path / "g1.mcap", unitree_messages(rollout, kp, 0.05 * kp))
-    motors = ", ".join(joint_names(23))
+    motors = ", ".join(joint_names())
     first, second = imported(tmp_path, "g1.mcap", f"layout: unitree_hg\ntime: log\njoints: [{motors}]\n")
     columns = ("joint_pos", "joint_vel", "joint_target", "base_quat", "base_ang_vel")
     same(first, rollout, slice(0, 76), columns)
@@ -100,7 +100,7 @@ def test_motors_that_the_model_has_not_are_left_out_and_ankles_driven_apart_are_
     rollout = g1_rollout(0, seconds=1.2)
     gains = np.full(rollout.joint_pos.shape, 50.0)
     write_mcap(tmp_path / "g1.mcap", unitree_messages(rollout, gains, gains))
-    names = [name if place not in (1, 3) else "_" for place, name in enumerate(joint_names(23))]
+    names = [name if place not in (1, 3) else "_" for place, name in enumerate(joint_names())]
     (ours,) = imported(tmp_path, "g1.mcap", f"layout: unitree_hg\ntime: log\njoints: [{', '.join(names)}]\n")
     assert ours.joints == tuple(name for name in names if name != "_") and len(ours.meta["kp"]) == 21
     np.testing.assert_allclose(ours.joint_pos, np.delete(rollout.joint_pos, [1, 3], axis=1), atol=1e-6)

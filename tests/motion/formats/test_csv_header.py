@@ -21,13 +21,13 @@ def soma(motions, name="soma.csv", header=SOMA, metres=0.01, degrees=True, order
     quat = Rotation.from_euler(order, euler).as_quat()[:, [3, 0, 1, 2]]
     euler = euler[:, [order.lower().index(axis) for axis in "xyz"]]
     joints = np.zeros((frames, 29))
-    joints[:, [joint_names(29).index(joint) for joint in joint_names()]] = raw.joint_pos
+    joints[:, [joint_names(every=True).index(joint) for joint in joint_names()]] = raw.joint_pos
     unit = 180 / np.pi if degrees else 1.0
     counter = np.arange(frames)[:, None]
     table = np.concatenate([counter, raw.root_pos / metres, euler * unit, joints * unit], axis=1)
     for (row, column), value in changed.get("cells", {}).items():
         table[row, column] = value
-    names = ["Frame", *header, *(f"{joint}_dof" for joint in joint_names(29))]
+    names = ["Frame", *header, *(f"{joint}_dof" for joint in joint_names(every=True))]
     path = motions.folder / name
     np.savetxt(path, table, fmt="%.9f", delimiter=",", header=",".join(names), comments="")
     return path, raw, quat

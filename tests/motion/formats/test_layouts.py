@@ -33,7 +33,10 @@ def columns(raw) -> np.ndarray:
 
 
 def test_unitrees_own_23_joints_are_those_of_its_model():
-    legs, arm = list(joint_names(29)[:12]), ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll")
+    legs, arm = (
+        list(joint_names(every=True)[:12]),
+        ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll"),
+    )
     arms = [f"{side}_{name}_joint" for side in ("left", "right") for name in arm]
     assert list(UNITREE) == [*legs, "waist_yaw_joint", *arms]
 
@@ -61,7 +64,7 @@ def test_a_csv_is_read_by_its_names_or_by_the_layout_that_is_set(motions):
 def test_a_pickle_is_read_by_its_names_or_by_the_axes_of_pose_aa(motions):
     raw = locked(motions)
     pose = np.zeros((80, 27, 3))
-    axes = {joint.name: joint.axis for joint in joints(29)}
+    axes = {joint.name: joint.axis for joint in joints(every=True)}
     for number, name in enumerate(UNITREE):
         pose[:, 1 + number] = columns(raw)[:, number, None] * np.array(axes[name])
     pose[:, 0] = motions.fields(raw)["pose_aa"][:, 0]
@@ -88,7 +91,7 @@ def test_bodies_tell_the_layout_of_an_npz(motions):
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
 def test_isaac_labs_export_is_read_by_its_names(motions, rate, order):
     raw = motions.raw(yaw=np.pi)
-    names = np.random.default_rng(0).permutation(joint_names(29))
+    names = np.random.default_rng(0).permutation(joint_names(every=True))
     wide = np.zeros((80, 29))
     for number, name in enumerate(joint_names()):
         wide[:, list(names).index(name)] = raw.joint_pos[:, number]

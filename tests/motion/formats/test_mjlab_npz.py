@@ -12,15 +12,15 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.formats import orders
 from bumblebee.motion.formats.read import RobotConfig, is_robot_npz, read_robot
 from bumblebee.motion.reading.usable import usable
-from bumblebee.robot.facts import KEY_BODIES, g1_bodies, joint_names
+from bumblebee.robot.facts import KEY_BODIES, joint_names, robot_bodies
 from bumblebee.robot.model import RobotConfig as ModelConfig
 from bumblebee.robot.model import build_model
 
 NAME = "isaac.npz"
 
 
-DEPTH = tuple(g1_bodies())
-model_29 = cache(lambda: build_model(ModelConfig(dof=29)))
+DEPTH = tuple(robot_bodies())
+model_29 = cache(lambda: build_model(ModelConfig(every_joint=True)))
 
 
 def arrays(raw, joints="depth_first", bodies=DEPTH, quaternion="wxyz", dof=29):
@@ -28,18 +28,18 @@ def arrays(raw, joints="depth_first", bodies=DEPTH, quaternion="wxyz", dof=29):
     model = model_29()
     data = mujoco.MjData(model)
     wide = 0.3 * np.sin(np.arange(len(raw.root_pos)))[:, None] * np.ones(29)
-    wide[:, [joint_names(29).index(name) for name in joint_names()]] = raw.joint_pos
+    wide[:, [joint_names(every=True).index(name) for name in joint_names()]] = raw.joint_pos
     pos, quat = np.empty((len(wide), len(bodies), 3)), np.empty((len(wide), len(bodies), 4))
     for row, angles in enumerate(wide):
         data.qpos[:] = np.concatenate([raw.root_pos[row], raw.root_quat[row], angles])
         mujoco.mj_kinematics(model, data)
         for column, name in enumerate(bodies):
             pos[row, column], quat[row, column] = data.body(name).xpos, data.body(name).xquat
-    order = orders.joint_order(joints, joint_names(dof))
+    order = orders.joint_order(joints, joint_names(every=dof == 29))
     quat = quat[..., ["wxyz".index(part) for part in quaternion]]
     return {
         "fps": np.array([50]),
-        "joint_pos": wide[:, [joint_names(29).index(name) for name in order]].astype(np.float32),
+        "joint_pos": wide[:, [joint_names(every=True).index(name) for name in order]].astype(np.float32),
         "body_pos_w": pos.astype(np.float32),
         "body_quat_w": quat.astype(np.float32),
     }
@@ -63,7 +63,9 @@ def same(came, raw):
 
 
 def test_isaacs_order_is_the_one_that_the_field_publishes():
-    place = [joint_names(29).index(name) for name in orders.joint_order("breadth_first", joint_names(29))]
+    place = [
+        joint_names(every=True).index(name) for name in orders.joint_order("breadth_first", joint_names(every=True))
+    ]
     assert place == [0, 6, 12, 1, 7, 13, 2, 8, 14, 3, 9, 15, 22, 4, 10, 16, 23, 5, 11, 17, 24, 18, 25, 19, 26, 20, 27,
                      21, 28]  # fmt: skip
 
@@ -90,7 +92,7 @@ def test_a_robot_that_stands_at_zero_does_not_tell_and_the_order_is_asked_for(mo
     joint_pos = np.zeros_like(raw.joint_pos)
     joint_pos[:, joint_names().index("waist_yaw_joint")] = 1e-3  # too little for any body to move a millimetre
     content = arrays(motions.raw(30, joint_pos=joint_pos))
-    content["joint_pos"][:, [joint_names(29).index(n) for n in joint_names(29) if "wrist" in n]] = 0
+    content["joint_pos"][:, [joint_names(every=True).index(n) for n in joint_names(every=True) if "wrist" in n]] = 0
     with pytest.raises(BadInput, match=r"joint_pos: expected one order of the joints, came two that fit .*npz_joints"):
         read(motions, content)
     came = read(motions, content, RobotConfig(npz_joints="depth_first"))
@@ -116,7 +118,7 @@ def test_the_root_may_stand_before_the_joints(motions):
 
 def test_names_in_the_file_decide(motions):
     raw = motions.raw(30)
-    names = orders.joint_order("breadth_first", joint_names(29))
+    names = orders.joint_order("breadth_first", joint_names(every=True))
     content = {**arrays(raw, "breadth_first"), "joint_names": np.array([f"robot/{name}" for name in names])}
     same(read(motions, content), raw)
     for wrong, line in (

@@ -16,7 +16,7 @@ from bumblebee.motion.formats.read import RobotConfig, read_robot
 from bumblebee.motion.formats.write import FORMATS, asap_pickle, g1_csv, mjlab_npz, wide, write_motion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.resample import resample
-from bumblebee.robot.facts import g1_bodies, joint_names, joints
+from bumblebee.robot.facts import joint_names, joints, robot_bodies
 from bumblebee.robot.model import RobotConfig as ModelConfig
 from bumblebee.robot.model import build_model
 
@@ -65,9 +65,11 @@ def test_one_format_after_the_other_loses_nothing(motions, first, then):
 
 def test_23_columns_come_back_as_29_do(motions):
     clip = lively(motions)
-    (raw,) = read_robot(clip_path("g1_csv"), g1_csv(clip, dof=23), RobotConfig(csv_fps=50, joints_23="asap"))
+    (raw,) = read_robot(clip_path("g1_csv"), g1_csv(clip, every=False), RobotConfig(csv_fps=50, joints_23="asap"))
     np.testing.assert_array_equal(raw.joint_pos.astype(np.float32), clip.joint_pos)
-    assert g1_csv(clip, dof=23).splitlines()[0].count(b",") == 29 and g1_csv(clip).splitlines()[0].count(b",") == 35
+    assert (
+        g1_csv(clip, every=False).splitlines()[0].count(b",") == 29 and g1_csv(clip).splitlines()[0].count(b",") == 35
+    )
 
 
 def test_a_rate_that_divides_another_comes_back_on_its_frames(motions):
@@ -88,14 +90,14 @@ def arrays(raw):
 def test_body_velocities_are_those_of_the_simulator(motions):
     clip = lively(motions)
     found, rates = body_motion(clip), velocities(clip)
-    model = build_model(ModelConfig(dof=29))
+    model = build_model(ModelConfig(every_joint=True))
     data, speed = mujoco.MjData(model), np.empty(6)
     for row in (0, 33, clip.frames - 1):
-        data.qpos[:] = np.concatenate([clip.root_pos[row], clip.root_quat[row], wide(clip.joint_pos, 29)[row]])
-        joint_vel = wide(rates.joint_vel, 29)[row]
+        data.qpos[:] = np.concatenate([clip.root_pos[row], clip.root_quat[row], wide(clip.joint_pos)[row]])
+        joint_vel = wide(rates.joint_vel)[row]
         data.qvel[:] = np.concatenate([rates.root_lin_vel_w[row], rates.root_ang_vel_b[row], joint_vel])
         mujoco.mj_forward(model, data)
-        for column, body in enumerate(g1_bodies()):
+        for column, body in enumerate(robot_bodies()):
             body_id = model.body(body).id
             mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body_id, speed, 0)
             np.testing.assert_allclose(found.ang_vel[row, column], speed[:3], atol=1e-6)
@@ -115,8 +117,8 @@ def test_mjlab_gets_its_arrays_its_order_and_float32(motions):
               "body_ang_vel_w": (frames, 30, 3)}  # fmt: skip
     assert {key: value.shape for key, value in found.items()} == shapes
     assert {value.dtype for key, value in found.items() if key != "fps"} == {np.dtype(np.float32)}
-    model = build_model(ModelConfig(dof=29))  # its tree is that of mjlab's MJCF
-    assert [model.body(i).name for i in range(1, model.nbody)] == list(g1_bodies())
+    model = build_model(ModelConfig(every_joint=True))  # its tree is that of mjlab's MJCF
+    assert [model.body(i).name for i in range(1, model.nbody)] == list(robot_bodies())
     np.testing.assert_array_equal(found["body_pos_w"][:, 0], clip.root_pos)
     np.testing.assert_array_equal(found["body_quat_w"][:, 0], clip.root_quat)
     knee = [model.joint(i).name for i in range(1, model.njnt)].index("left_knee_joint")

@@ -15,7 +15,7 @@ from bumblebee.motion.retarget.collision import (
     shape_heights,
 )
 from bumblebee.motion.retarget.config import RetargetConfig
-from bumblebee.motion.retarget.mapping import g1
+from bumblebee.motion.retarget.mapping import this_robot
 from bumblebee.motion.retarget.retarget import aim, fit
 from bumblebee.motion.retarget.tree import poses
 from tests.motion.retarget.robots import small
@@ -63,7 +63,7 @@ def test_distances_of_the_small_robots_links_are_those_of_mujoco():
 
 
 def test_neighbours_and_what_overlaps_at_rest_are_no_obstacles():
-    robot = g1()
+    robot = this_robot()
     kept = obstacles(robot)
     hops = _hops(robot.tree.parent)
     assert (hops[tuple(kept.shapes.body[kept.pairs].T)] > 2).all()
@@ -105,7 +105,7 @@ def _reaching(frames: int = 80) -> np.ndarray:
 
 
 def test_arms_that_are_told_to_go_through_the_torso_stay_out_of_it():
-    robot, config = g1(), RetargetConfig()
+    robot, config = this_robot(), RetargetConfig()
     kept = obstacles(robot)
     target = aim(standing(80, wrists=_reaching()), robot, FPS, config)
 
@@ -118,7 +118,7 @@ def test_arms_that_are_told_to_go_through_the_torso_stay_out_of_it():
 
 
 def test_knees_and_hands_stay_above_the_floor():
-    robot = g1()
+    robot = this_robot()
     motion = standing(60)
     motion.positions[..., 2] -= 0.7 * np.sin(np.linspace(0, np.pi, 60))[:, None]
 

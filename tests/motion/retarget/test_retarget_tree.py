@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.retarget.mapping import g1
+from bumblebee.motion.retarget.mapping import this_robot
 from bumblebee.motion.retarget.tree import jacobian, points, poses, tree_of, turns
 from tests.motion.retarget.robots import small_model
 
@@ -28,7 +28,7 @@ def _set(model: mujoco.MjModel, root: np.ndarray, turn: np.ndarray, joint: np.nd
 
 @pytest.fixture(params=["g1", "small"])
 def model(request) -> mujoco.MjModel:
-    return g1().model if request.param == "g1" else small_model()
+    return this_robot().model if request.param == "g1" else small_model()
 
 
 def test_poses_axes_and_anchors_are_those_of_mujoco(model):

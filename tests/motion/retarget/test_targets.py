@@ -5,14 +5,14 @@ import pytest
 
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.retarget.config import RetargetConfig
-from bumblebee.motion.retarget.mapping import g1
+from bumblebee.motion.retarget.mapping import this_robot
 from bumblebee.motion.retarget.retarget import aim
 from bumblebee.motion.retarget.targets import SEGMENTS, Targets, at_rate
 from tests.motion.retarget.stepping import ANKLE, FPS, HIPS, changed, jump, standing, steps, turned
 
 
 def _aim(motion: HumanMotion) -> Targets:
-    return aim(motion, g1(), FPS, RetargetConfig())
+    return aim(motion, this_robot(), FPS, RetargetConfig())
 
 
 def test_a_person_of_any_size_gives_the_same_targets():

@@ -82,6 +82,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A repository with this one's rules of git and DVC, a local remote, and a set of four motions."""
     folder = tmp_path / "lab"
     (folder / "data/raw").mkdir(parents=True)
+    shutil.copytree(HOME / "data/robot", folder / "data/robot")
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("DVC_SITE_CACHE_DIR", str(tmp_path / "site"))
     monkeypatch.setenv("SHELL", "/bin/sh")

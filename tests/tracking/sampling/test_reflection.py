@@ -5,7 +5,7 @@ import torch
 
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.robot.facts import KEY_BODIES
-from bumblebee.tracking.mirror import other_side
+from bumblebee.robot.mirror import other_side
 from bumblebee.tracking.sampling.reflection import MARK, reflected, with_reflections
 from bumblebee.tracking.sampling.sampler import ClipShares
 

@@ -1,0 +1,138 @@
+"""A robot's folder, read: a robot.yaml (docs/your-robot.md says what stands in it) and the maker's MJCF as published.
+
+All that depends on the robot is read from here; a process has one robot (`which`) from its first import to its end.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.io.read import parse_yaml, read_text
+from bumblebee.robot.shapes import Bodies, capsule
+from bumblebee.robot.which import SHIPPED, chosen_name, path_of, shipped
+from bumblebee.robot.written import EVERY, SIDES, Written, require
+
+
+@dataclass(frozen=True, eq=False)
+class RobotFolder:
+    """A robot as its folder says it.
+
+    `bodies`: name -> parent, pose, inertia, joint, collision primitives, sites, parents first; lengths m, masses kg,
+    inertias kg m^2, angles rad, torques N m, quaternions wxyz.
+    """
+
+    path: Path
+    written: Written
+    bodies: Bodies
+    sha256: str
+    """Hash of what a policy depends on: bodies, joints, motors, key bodies, soles and stand. Its contract names it."""
+
+
+@cache
+def chosen() -> RobotFolder:
+    """The robot of this process."""
+    return read_folder(path_of(chosen_name()))
+
+
+def read_folder(path: Path) -> RobotFolder:
+    """A robot from its file.
+
+    Raises:
+        BadInput: a key, a body or a joint that is not there, or a model that no robot of ours can be (`bodies_of`).
+    """
+    text = read_text(path)
+    written = require(path, _said(path, text))
+    source = (SHIPPED if written.bodies else path.parent) / (written.bodies or written.model)
+    table = _table(source) if written.bodies else _of_model(source)
+    bodies = _with_soles(_with_points(path, _with_motors(path, table, written), written), written)
+    return RobotFolder(path.parent, written, bodies, _hash(bodies, written))
+
+
+def _hash(bodies: Bodies, written: Written) -> str:
+    what = [
+        bodies,
+        written.held,
+        dict(written.key_bodies),
+        dict(written.soles),
+        written.sole_radius,
+        dict(written.stand),
+    ]
+    return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()
+
+
+def _said(path: Path, text: str) -> Any:
+    """The file's content; what it does not say is as in the file that it is `like`, of those that come along."""
+    said = parse_yaml(path, text)
+    like = said.pop("like", None) if isinstance(said, dict) else None
+    if like is None:
+        return said
+    if like not in shipped():
+        raise BadInput(f"{path}: like", f"one of {', '.join(shipped())}", repr(like)[:60])
+    other = SHIPPED / f"{like}.yaml"
+    return {**_said(other, read_text(other)), **said}
+
+
+def _of_model(path: Path) -> Bodies:
+    from bumblebee.robot.mjcf import bodies_of  # with MuJoCo, which a table does not need
+
+    return bodies_of(path)
+
+
+def _table(path: Path) -> Bodies:
+    table = parse_yaml(path, read_text(path))
+    if not isinstance(table, Mapping) or not isinstance(table.get("bodies"), dict):
+        raise BadInput(path, "a table `bodies`", "none")
+    return table["bodies"]
+
+
+def _with_motors(path: Path, bodies: Bodies, written: Written) -> Bodies:
+    """The table with what `motors` says of its joints in the place of the model's."""
+    joints = {facts["joint"]["name"]: facts["joint"] for facts in bodies.values() if "joint" in facts}
+    own = {name: said for name, said in written.motors.items() if name != EVERY}
+    for name in (*written.held, *own, *(joint for left_out in written.layouts.values() for joint in left_out)):
+        if name not in joints:
+            raise BadInput(f"{path}: {name}", f"a joint of the model: {', '.join(joints)}"[:400], "none of that name")
+    for name, joint in joints.items():
+        joint |= {**written.motors.get(EVERY, {}), **own.get(name, {})}
+    for name, joint in joints.items():
+        lacks = [key for key in ("effort_limit", "velocity_limit", "armature") if key not in joint]
+        if lacks:
+            do = f"Write `motors: {{{name}: {{{lacks[0]}: ...}}}}` in {path.name}."
+            raise BadInput(f"{path}: {name}", f"its {lacks[0]}", "neither in the model nor in `motors`", do)
+    return bodies
+
+
+def _with_points(path: Path, bodies: Bodies, written: Written) -> Bodies:
+    """The table with a body without mass at each key body that is a point of another, such as a hand of a forearm."""
+    for role, (body, place) in written.key_bodies.items():
+        if body not in bodies:
+            raise BadInput(f"{path}: key_bodies.{role}", f"a body of the model: {', '.join(bodies)}"[:400], body[:60])
+        if place is not None:
+            bodies[role] = {
+                "parent": body,
+                "pos": list(place),
+                "quat": [1.0, 0.0, 0.0, 0.0],
+                "mass": 0.0,
+                "com": [0.0, 0.0, 0.0],
+                "inertia": [0.0, 0.0, 0.0],
+                "inertia_quat": [1.0, 0.0, 0.0, 0.0],
+            }
+    return bodies
+
+
+def _with_soles(bodies: Bodies, written: Written) -> Bodies:
+    """The table with two capsules along each sole's edges as a foot's shapes, where it has none of its own for that."""
+    for side in SIDES:
+        foot = bodies[written.key_bodies[f"{side}_foot"][0]]
+        if not any("_foot" in shape["name"] for shape in foot.get("collision", [])):
+            corners = [np.array(corner) for corner in sorted(written.soles[side], key=lambda one: (one[1], one[0]))]
+            edges = enumerate((corners[:2], corners[2:]), 1)
+            foot["collision"] = [capsule(f"{side}_foot{i}_collision", a, b, written.sole_radius) for i, (a, b) in edges]
+    return bodies

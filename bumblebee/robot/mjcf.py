@@ -1,0 +1,186 @@
+"""A maker's MJCF as the table of facts that every robot of ours is: its tree of hinges, without meshes.
+
+What the table cannot hold is refused in one line, not dropped: joints that are no hinges, two joints of one body, a
+base that does not float, equalities and tendons between joints, masses that only a mesh file would tell.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.io.read import read_text
+from bumblebee.robot.drives import explicit_drives
+from bumblebee.robot.shapes import Bodies, capsule, floats
+
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_SIMPLE = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+}
+_LARGEST = 64 << 20  # bytes of the XML itself
+_THINNEST = 0.005  # m of a shape that an inertia stands for
+
+
+def bodies_of(path: Path) -> Bodies:
+    """The table of a model's one floating tree, parents first.
+
+    Args:
+        path: MJCF. Meshes are left out: bodies whose other shapes can touch keep these, as spheres and capsules; the
+            others get a capsule of their mass and inertia.
+
+    Raises:
+        BadInput: no model that loads without its meshes, or one that the table cannot hold.
+    """
+    model = _compiled(path)
+    root = _root(path, model)
+    own = [body for body in range(root, model.nbody) if model.body_rootid[body] == root]
+    bodies: Bodies = {}
+    for body in own:
+        name = model.body(body).name
+        facts = _frame(model, body)
+        facts["parent"] = "world" if body == root else model.body(int(model.body_parentid[body])).name
+        if body != root and (joint := _joint(path, model, body)):
+            facts["joint"] = joint
+        if shapes := _shapes(model, body, name):
+            facts["collision"] = shapes
+        bodies[name] = facts
+    return bodies
+
+
+def _compiled(path: Path) -> mujoco.MjModel:
+    text = read_text(path, _LARGEST)
+    if "\0" in text or "<mujoco" not in text:
+        raise BadInput(path, "an MJCF model", "another file")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        for geom in list(spec.geoms):
+            if int(geom.type) == _MESH:
+                spec.delete(geom)
+        for kind in (spec.meshes, spec.skins, spec.textures, spec.materials, spec.hfields):
+            for element in list(kind):
+                spec.delete(element)
+        return explicit_drives(spec)[0].compile()
+    except Exception as error:  # ValueError mostly; FatalError from MuJoCo's allocations
+        came = " ".join(str(error).split())[:200]
+        do = "Masses and inertias must be written in the model (`inertial`), since meshes are not read."
+        raise BadInput(path, "an MJCF that loads without its meshes", came, do) from None
+
+
+def _root(path: Path, model: mujoco.MjModel) -> int:
+    """The floating base with the largest tree."""
+    free = [int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE]
+    if not free:
+        raise BadInput(
+            path, "a base with a `freejoint`", "a model without one", "A robot that is bolted down cannot fall."
+        )
+    if model.neq:
+        raise BadInput(path, "joints that move by themselves", f"{model.neq} equalities between joints or bodies")
+    return max(free, key=lambda body: int((model.body_rootid == body).sum()))
+
+
+def _frame(model: mujoco.MjModel, body: int) -> dict[str, Any]:
+    """Pose and inertia of a body."""
+    return {
+        "pos": floats(model.body_pos[body]),
+        "quat": floats(model.body_quat[body]),
+        "mass": float(model.body_mass[body]),
+        "com": floats(model.body_ipos[body]),
+        "inertia": floats(model.body_inertia[body]),
+        "inertia_quat": floats(model.body_iquat[body]),
+    }
+
+
+def _joint(path: Path, model: mujoco.MjModel, body: int) -> dict[str, Any] | None:
+    """The body's hinge with its drive, or None where it has none."""
+    count, first = int(model.body_jntnum[body]), int(model.body_jntadr[body])
+    if not count:
+        return None
+    joint = model.joint(first)
+    if count > 1 or model.jnt_type[first] != mujoco.mjtJoint.mjJNT_HINGE:
+        came = f"{count} joints" if count > 1 else "one that is no hinge"
+        raise BadInput(f"{path}: {model.body(body).name}", "one hinge a body", came)
+    if np.abs(model.jnt_pos[first]).max() > 1e-6:
+        raise BadInput(f"{path}: {joint.name}", "a joint at its body's origin", "one beside it")
+    if not model.jnt_limited[first]:
+        raise BadInput(f"{path}: {joint.name}", "a range", "none", "Write one: a policy's targets end there.")
+    dof = int(model.jnt_dofadr[first])
+    told: dict[str, Any] = {
+        "name": joint.name,
+        "axis": floats(model.jnt_axis[first]),
+        "range": floats(model.jnt_range[first]),
+        "motor": "as in the model",
+    }
+    for key, value in (
+        ("armature", model.dof_armature[dof]),
+        ("damping", model.dof_damping[dof]),
+        ("frictionloss", model.dof_frictionloss[dof]),
+    ):
+        if value > 0:
+            told[key] = float(value)
+    return told | _drive(model, first)
+
+
+def _drive(model: mujoco.MjModel, joint: int) -> dict[str, float]:
+    """Torque limit and servo gains of the actuator on a joint, as far as the model says them."""
+    found: dict[str, float] = {}
+    for actuator in range(model.nu):
+        if model.actuator_trnid[actuator, 0] != joint:
+            continue
+        if model.actuator_forcelimited[actuator]:
+            found["effort_limit"] = float(model.actuator_forcerange[actuator, 1])
+        if model.actuator_biasprm[actuator, 1] < 0:
+            found["kp"] = -float(model.actuator_biasprm[actuator, 1])
+            found["kd"] = -float(model.actuator_biasprm[actuator, 2])
+    return found
+
+
+def _shapes(model: mujoco.MjModel, body: int, name: str) -> list[dict[str, Any]]:
+    geoms = [
+        geom
+        for geom in range(model.ngeom)
+        if model.geom_bodyid[geom] == body and model.geom_contype[geom] | model.geom_conaffinity[geom]
+    ]
+    found = [
+        _rounded(f"{name}_{i}_collision", _SIMPLE[kind], model.geom_size[g], model.geom_pos[g], model.geom_quat[g])
+        for i, g in enumerate(geoms, 1)
+        if (kind := int(model.geom_type[g])) in _SIMPLE
+    ]
+    if found or not model.body_mass[body]:
+        return found
+    half = half_lengths(model.body_mass[body], model.body_inertia[body])
+    return [_rounded(f"{name}_1_collision", "box", half, model.body_ipos[body], model.body_iquat[body])]
+
+
+def half_lengths(mass: float, inertia: np.ndarray) -> np.ndarray:
+    """Half the sides of the box of even density with this mass [kg] and these principal inertias [kg m^2], (3,) [m]."""
+    square = 1.5 * (inertia.sum() - 2 * inertia) / mass
+    return np.sqrt(np.maximum(square, _THINNEST**2))
+
+
+def _rounded(name: str, kind: str, size: np.ndarray, pos: np.ndarray, quat: np.ndarray) -> dict[str, Any]:
+    """A sphere as it is; any other shape as the capsule along its longest side, as long as the shape."""
+    if kind == "sphere":
+        return {
+            "name": name,
+            "type": "sphere",
+            "size": [float(size[0])],
+            "pos": floats(pos),
+            "quat": [1.0, 0.0, 0.0, 0.0],
+        }
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, np.asarray(quat, float))
+    axes = turn.reshape(3, 3).T
+    if kind in ("capsule", "cylinder"):
+        axis, radius, half = axes[2], float(size[0]), float(size[1]) + (float(size[0]) if kind == "capsule" else 0.0)
+    else:
+        longest = int(np.argmax(size))
+        axis, half = axes[longest], float(size[longest])
+        radius = min(half, float(np.mean(np.delete(size, longest))))
+    reach = axis * max(0.0, half - radius)
+    return capsule(name, pos - reach, pos + reach, radius)
