@@ -1,0 +1,57 @@
+"""A workspace has a robot of its own: written once, kept, and refused before the first stage where it does not fit."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from bumblebee.errors import BadInput
+from bumblebee.new_robot.first_folder import draft_folder
+from flows import workspace as workspaces
+from flows.environment import environment
+from tests.robot.made_up import mjcf
+
+
+def robot_of(folder: Path) -> dict:
+    return yaml.safe_load((folder / "data/robot/robot.yaml").read_text())
+
+
+def test_a_workspace_has_the_checkouts_robot_or_the_one_that_is_asked_for(tmp_path: Path) -> None:
+    folder = workspaces.create(tmp_path / "lab")
+    assert robot_of(folder) == {"like": "g1_23"}
+    workspaces.create(folder, robot="h1")
+    assert robot_of(folder) == {"like": "h1"}
+    workspaces.create(folder)
+    assert robot_of(folder) == {"like": "h1"}
+    with pytest.raises(BadInput, match="robot atlas: expected a folder"):
+        workspaces.create(folder, robot="atlas")
+
+
+def test_a_robots_folder_is_copied_whole(tmp_path: Path) -> None:
+    (tmp_path / "made.xml").write_text(mjcf())
+    draft_folder(tmp_path / "made.xml", tmp_path / "mine")
+    folder = workspaces.create(tmp_path / "lab", robot=str(tmp_path / "mine"))
+    assert (folder / "data/robot/made.xml").read_text() == mjcf()
+    assert robot_of(folder)["robot"] == "made"
+    workspaces.create(folder, robot="g1_29")
+    assert [file.name for file in (folder / "data/robot").iterdir()] == ["robot.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("own_motions", "line"),
+    [
+        (
+            False,
+            "motions.source: expected a folder of motions, came what comes along for g1_23dof, and this is h1",
+        ),
+        (True, "base.init: expected scratch, came what comes along for g1_23dof"),
+    ],
+)
+def test_what_comes_along_for_the_g1_is_refused_of_another_robot(tmp_path: Path, own_motions: bool, line: str) -> None:
+    folder = workspaces.create(tmp_path / "lab", motions=tmp_path if own_motions else None, robot="h1")
+    command = [sys.executable, "-m", "tasks.sections"]
+    came = subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=120)
+    assert came.returncode == 2
+    assert line in came.stderr
