@@ -105,7 +105,7 @@ class DeltaConfig(Ranged):
         self.require(not self.ppo.symmetry, "ppo", "symmetry: false, since a correction is not reflected")
 
 
-def layout(joints: int = 23) -> list[tuple[str, int]]:
+def layout(joints: int = len(joint_names())) -> list[tuple[str, int]]:
     """Names and sizes of what the delta action sees."""
     parts = [("gravity_b", 3), ("root_lin_vel_b", 3), ("root_ang_vel_b", 3)]
     return [*parts, ("joint_pos", joints), ("joint_vel", joints), ("joint_target", joints)]
