@@ -7,6 +7,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joint_names
+from bumblebee.wire.links import unitree_hg
 from bumblebee.wire.links.unitree_hg import HELD, LOW_CMD, LOW_STATE, MOTORS, OURS, as_cdr, checksum, command, from_cdr
 from bumblebee.wire.messages import Mode, Order, layout_of
 
@@ -82,3 +83,9 @@ def test_a_state_that_is_torn_or_of_another_length_is_refused() -> None:
     sent = command(order(), 5, WRISTS, 40.0, 1.0)
     assert from_cdr(as_cdr(sent), LOW_CMD) == sent
     assert len(as_cdr(sent)) == struct.calcsize("<3Bx5fI" + "B3x5fI" * 34 + "5I")
+
+
+def test_the_link_serves_the_robot_that_it_was_tried_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unitree_hg, "ROBOT", "h1_19dof")
+    with pytest.raises(BadInput, match="wire unitree: expected g1_23dof, came h1_19dof"):
+        unitree_hg.require_served()

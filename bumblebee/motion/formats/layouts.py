@@ -14,7 +14,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.reading.remedy import say
-from bumblebee.robot.facts import LAYOUTS, joint_names
+from bumblebee.robot.facts import LAYOUTS, ROBOT, joint_names
 
 ASAP, UNITREE = "asap", "unitree"
 NOTE = "23 joints as in Unitree's own G1 of 23: waist roll and pitch are 0, wrist rolls are not read"
@@ -74,7 +74,7 @@ def require_joints(where: object, names: Sequence[str], kind: str = "name", firs
     for number, name in enumerate(names):
         if name not in joint_names(every=True):
             came = f"unknown joint {name.removesuffix('_joint')[:60]!r}"
-            raise BadInput(f"{where}, {kind} {first + number}", "the name of a G1 joint", came)
+            raise BadInput(f"{where}, {kind} {first + number}", f"the name of a joint of {ROBOT}", came)
         if name in names[:number]:
             came = f"{name} in {kind}s {first + names.index(name)} and {first + number}"
             raise BadInput(where, "each joint once", came)

@@ -10,7 +10,7 @@ from bumblebee.errors import BadInput
 from bumblebee.robot.facts import ROBOT, joint_names
 from bumblebee.wire.clock import SECOND
 from bumblebee.wire.links.lcm_codec import Codec, encode_card
-from bumblebee.wire.links.unitree_hg import HELD, LOW_STATE, OURS, SERIES, checksum, command
+from bumblebee.wire.links.unitree_hg import HELD, LOW_STATE, OURS, SERIES, checksum, command, require_served
 from bumblebee.wire.messages import Card, Mode, Order, State, layout_of
 from bumblebee.wire.robot_end.hearing import RELEASE
 
@@ -30,6 +30,7 @@ class ControllerEnd:
     """
 
     def __init__(self, kp: float, kd: float) -> None:
+        require_served()
         self._kp, self._kd, self._codec = kp, kd, Codec(len(joint_names()))
         self._writers: list[int] = []
         self._first: np.ndarray | None = None
@@ -104,6 +105,7 @@ class RobotEnd:
     """Orders that come to a simulated robot, and states that go."""
 
     def __init__(self) -> None:
+        require_served()
         self._codec, self._count = Codec(len(joint_names())), 0
 
     def order(self, record: np.ndarray, writer: int) -> bytes:

@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import ROBOT, joint_names
 from bumblebee.wire.messages import Mode, Order
 
 _LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
@@ -19,9 +19,11 @@ _PARTS = (("left_", _LEG), ("right_", _LEG), ("waist_", ("yaw", "roll", "pitch")
 MOTORS = tuple(f"{side}{name}_joint" for side, names in _PARTS for name in names)
 """Joints of a G1 with 29 motors, in the order of its slots; the ankles and the waist in series (mode_pr 0)."""
 OURS = np.array([MOTORS.index(name) for name in joint_names() if name in MOTORS])
-"""(J,) slot of each of our joints; fewer than these of a robot that is no G1, which no end of this link serves."""
+"""(23,) slot of each of our joints; of another robot no end of this link is made (`require_served`)."""
 HELD = np.setdiff1d(np.arange(len(MOTORS)), OURS)
-"""Slots of the motors that are held: of the 23-joint G1 the six of its wrists."""
+"""(6,) slots of the wrists."""
+SERVED = "g1_23dof"
+"""The robot that this link was tried with."""
 SERIES = 0
 """mode_pr: ankles by pitch and roll, not by their two motors."""
 
@@ -46,6 +48,16 @@ LOW_STATE = np.dtype(
 _NAMES = {LOW_CMD: "LowCmd_", LOW_STATE: "LowState_"}
 _BREAKS = {LOW_CMD: 2, LOW_STATE: 70}  # where the first motor begins in DDS; two bytes later in a record
 _MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+
+
+def require_served() -> None:
+    """Refuse the link for a robot that it was not tried with: what holds its other motors still is for these alone.
+
+    Raises:
+        BadInput: another robot than the G1 with its wrists held.
+    """
+    if ROBOT != SERVED:
+        raise BadInput("wire unitree", SERVED, ROBOT, "Use --wire lcm with a bridge of your robot.")
 
 
 def checksum(record: np.ndarray) -> int:

@@ -44,7 +44,7 @@ def test_an_unknown_joint_is_named(motions):
     names[3] = "left_tail_joint"
     path = motions.csv(motions.raw(), dof=23, header=",".join([*"xyzabcd", *names]))
     with pytest.raises(
-        BadInput, match=r"row 1, column 11: expected the name of a G1 joint, came unknown joint 'left_tail"
+        BadInput, match=r"row 1, column 11: expected the name of a joint of g1_23dof, came unknown joint 'left_tail"
     ):
         read_g1_csv(path, 30)
 
