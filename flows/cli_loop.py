@@ -1,6 +1,7 @@
 """Command line of the loop: `bumblebee demo`, `serve`, `report`, `fetch`; modules are imported when they are called."""
 
 import argparse
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import typer
 
 from bumblebee.commands.view import PORT, Meshes, Port, Ticks, play_shipped_policy
 from bumblebee.errors import BadInput
+from bumblebee.robot.which import VARIABLE
 
 Name = Annotated[str, typer.Option("--name", help="Workspace under runs/; without, the checkout itself.")]
 PrefectPort = Annotated[int, typer.Option("--prefect-port", help="Port of Prefect's server; 0: a free one.")]
@@ -37,6 +39,7 @@ def demo(
         play_shipped_policy(port, meshes, ticks)
         return
     require_checkout("demo")
+    chosen = os.environ.get(VARIABLE, "")  # before `tasks` says whose folder this is
     from bumblebee.last_line import guarded
     from flows.demo import started
 
@@ -46,7 +49,7 @@ def demo(
         "workspace": workspace,
         "profile": profile,
         "seed": seed,
-        "robot": robot,
+        "robot": robot or chosen,
     }
     more = {"prefect_port": prefect_port, "mlflow_port": mlflow_port, "verbose": verbose}
     raise typer.Exit(guarded(lambda: started(argparse.Namespace(**options, **more))))

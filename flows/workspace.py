@@ -12,6 +12,7 @@ import yaml
 
 import bumblebee
 from bumblebee.errors import BadInput
+from bumblebee.io.write import new_folder
 from bumblebee.robot.which import FILE, SHIPPED, path_of
 from flows.environment import environment
 from tasks.lab.private import private_index
@@ -99,12 +100,11 @@ def _write_robot(place: Path, robot: str) -> None:
         return
     else:
         files = {file.name: file.read_bytes() for file in (HOME / paths.ROBOT).iterdir()}
-    place.mkdir(parents=True, exist_ok=True)
-    for name in {file.name for file in place.iterdir()} - set(files):
-        (place / name).unlink()
-    for name, content in files.items():
-        if not (place / name).is_file() or (place / name).read_bytes() != content:
-            (place / name).write_bytes(content)
+    there = {file.name: file.read_bytes() for file in place.iterdir()} if place.is_dir() else {}
+    if there != files:
+        with new_folder(place) as fresh:
+            for name, content in files.items():
+                (fresh / name).write_bytes(content)
 
 
 def settings_of(folder: Path, profile: str | None) -> tuple[dict[str, Any], dict[str, Any] | None]:

@@ -1,7 +1,5 @@
 """A declared model in another folder: its includes and assets lie where it came from."""
 
-import math
-import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,16 +10,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import read_text
 from bumblebee.io.there import require_there
 from bumblebee.robot.drives import ON_JOINT, explicit_drives
-
-LARGEST = 64 << 20  # bytes of the XML itself; the largest public robot models have 1 MB
-MEMORY = 8 << 30  # bytes that a model may ask for its arena
-_MULTIPLIERS = (
-    ("replicate", ("count",), 1e5),
-    ("composite", ("count",), 1e6),
-    ("flexcomp", ("count",), 1e6),
-    ("texture", ("width", "height"), 1e8),
-    ("hfield", ("nrow", "ncol"), 1e8),
-)
+from bumblebee.robot.model_size import LARGEST, refuse_multiplied
 
 
 def load_model(path: Path) -> mujoco.MjModel:
@@ -36,7 +25,7 @@ def load_spec(path: Path) -> mujoco.MjSpec:
     text = read_text(path, LARGEST)
     if "\0" in text or "<" not in text:
         raise BadInput(path, "an MJCF model that loads", "a file that is no XML")
-    _refuse_multiplied(path, text)
+    refuse_multiplied(path, text)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compile()
@@ -45,20 +34,6 @@ def load_spec(path: Path) -> mujoco.MjSpec:
         do = "Put that file where the model names it: makers publish meshes beside their models." if lacks else ""
         raise BadInput(path, "an MJCF model that loads", str(error)[:300], do) from None
     return spec
-
-
-def _refuse_multiplied(path: Path, text: str) -> None:
-    """Refuse numbers in a model that make a few bytes into gigabytes before MuJoCo looks at them."""
-    for tag, keys, most in _MULTIPLIERS:
-        for element in re.findall(rf"<{tag}\b[^>]*>", text):
-            found = [re.findall(rf"\b{key}\s*=\s*[\"']([^\"']*)", element) for key in keys]
-            numbers = [float(n) for words in found for n in re.findall(r"\d+(?:\.\d+)?", " ".join(words))]
-            size = math.prod(numbers) if numbers else 0.0
-            if not size <= most:
-                raise BadInput(path, f"a {tag} of at most {most:g} ({' x '.join(keys)})", f"{size:.3g}")
-    for size, unit in re.findall(r"\bmemory\s*=\s*[\"']\s*(\d+)\s*([KMGTPE]?)", text):
-        if float(size) * 1024 ** " KMGTPE".index(unit or " ") > MEMORY:
-            raise BadInput(path, f"memory of at most {MEMORY:,} bytes", f"{size[:40]}{unit}")
 
 
 def name_assets_in_full(spec: mujoco.MjSpec) -> None:

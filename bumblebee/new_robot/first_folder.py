@@ -9,7 +9,7 @@ import yaml
 from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
-from bumblebee.io.write import new_folder
+from bumblebee.io.write import new_folder, refuse_foreign, refuse_overlap
 from bumblebee.new_robot.draft import draft, ends_of, poses_of
 from bumblebee.robot.mjcf import bodies_of
 from bumblebee.robot.shapes import Bodies
@@ -28,6 +28,8 @@ def draft_folder(model: Path, out: Path, overwrite: bool = False) -> tuple[str, 
     """
     if out.exists() and not overwrite:
         raise BadInput(out, "a new folder", "one that is there", "Name another, or say --overwrite.")
+    refuse_foreign(out, lambda path: (path / FILE).is_file(), "a robot's folder")
+    refuse_overlap(out, [model])
     bodies = bodies_of(model)
     made = draft(model, model.stem[:_NAME], model.name, bodies)
     text = "# A draft: `bumblebee robot check` says what does not hold; docs/your-robot.md explains each key.\n"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.robot.folder import chosen
+from bumblebee.robot.folder import chosen, stand_names
 from bumblebee.robot.shapes import Bodies
 from bumblebee.robot.written import ROLES, SIDES, Vector
 
@@ -78,8 +78,7 @@ def stand_pose(every: bool = False) -> np.ndarray:
     """Joint angles of the relaxed stand, (J,) [rad]; a side's joints may share a line of the robot's file."""
 
     def angle(name: str) -> float:
-        stem = name.removesuffix("_joint")
-        return next((_SAID.stand[key] for key in (name, stem, stem.split("_", 1)[-1]) if key in _SAID.stand), 0.0)
+        return next((_SAID.stand[key] for key in stand_names(name) if key in _SAID.stand), 0.0)
 
     return np.array([angle(name) for name in joint_names(every)])
 

@@ -28,7 +28,6 @@ class RobotFolder:
     inertias kg m^2, angles rad, torques N m, quaternions wxyz.
     """
 
-    path: Path
     written: Written
     bodies: Bodies
     sha256: str
@@ -51,8 +50,9 @@ def read_folder(path: Path) -> RobotFolder:
     written = require(path, _said(path, text))
     source = (SHIPPED if written.bodies else path.parent) / (written.bodies or written.model)
     table = _table(source) if written.bodies else _of_model(source)
-    bodies = _with_soles(_with_points(path, _with_motors(path, table, written), written), written)
-    return RobotFolder(path.parent, written, bodies, _hash(bodies, written))
+    _require_known(path, table, written)
+    bodies = _with_soles(_with_points(_with_motors(path, table, written), written), written)
+    return RobotFolder(written, bodies, _hash(bodies, written))
 
 
 def _hash(bodies: Bodies, written: Written) -> str:
@@ -92,28 +92,55 @@ def _table(path: Path) -> Bodies:
     return table["bodies"]
 
 
+def _require_known(path: Path, bodies: Bodies, written: Written) -> None:
+    """Refuse bodies and joints that the model does not have, and a pelvis that is not what floats."""
+    joints = [facts["joint"]["name"] for facts in bodies.values() if "joint" in facts]
+    named = {
+        "held": written.held,
+        "motors": [name for name in written.motors if name != EVERY],
+        "layouts": [joint for left_out in written.layouts.values() for joint in left_out],
+        "stand": [key for key in written.stand if not any(key in stand_names(joint) for joint in joints)],
+    }
+    for key, names in named.items():
+        for name in names:
+            if name not in joints:
+                raise BadInput(f"{path}: {key}", f"joints of the model: {', '.join(joints)}"[:400], name[:60])
+    placed = {"head": written.head, "neck": written.neck}
+    for key, (body, _) in {**placed, **{f"key_bodies.{r}": point for r, point in written.key_bodies.items()}}.items():
+        if body not in bodies:
+            raise BadInput(f"{path}: {key}", f"a body of the model: {', '.join(bodies)}"[:400], body[:60])
+    for role, (body, place) in written.key_bodies.items():
+        if place is not None and role in bodies:
+            raise BadInput(f"{path}: key_bodies.{role}", f"the model's own body {role}", f"a point of {body}")
+    root, pelvis = next(iter(bodies)), written.key_bodies["pelvis"][0]
+    if pelvis != root:
+        raise BadInput(f"{path}: key_bodies.pelvis", f"{root}, the body that floats", pelvis)
+
+
+def stand_names(joint: str) -> tuple[str, ...]:
+    """Keys of `stand` that mean a joint, the first that is said: its name, less `_joint`, less its side."""
+    stem = joint.removesuffix("_joint")
+    return joint, stem, stem.split("_", 1)[-1]
+
+
 def _with_motors(path: Path, bodies: Bodies, written: Written) -> Bodies:
     """The table with what `motors` says of its joints in the place of the model's."""
     joints = {facts["joint"]["name"]: facts["joint"] for facts in bodies.values() if "joint" in facts}
-    own = {name: said for name, said in written.motors.items() if name != EVERY}
-    for name in (*written.held, *own, *(joint for left_out in written.layouts.values() for joint in left_out)):
-        if name not in joints:
-            raise BadInput(f"{path}: {name}", f"a joint of the model: {', '.join(joints)}"[:400], "none of that name")
     for name, joint in joints.items():
-        joint |= {**written.motors.get(EVERY, {}), **own.get(name, {})}
+        joint |= {**written.motors.get(EVERY, {}), **written.motors.get(name, {})}
     for name, joint in joints.items():
         lacks = [key for key in ("effort_limit", "velocity_limit", "armature") if key not in joint]
         if lacks:
             do = f"Write `motors: {{{name}: {{{lacks[0]}: ...}}}}` in {path.name}."
             raise BadInput(f"{path}: {name}", f"its {lacks[0]}", "neither in the model nor in `motors`", do)
+        if ("kp" in joint) != ("kd" in joint):
+            raise BadInput(f"{path}: {name}", "kp and kd of a servo, or neither", "one of them")
     return bodies
 
 
-def _with_points(path: Path, bodies: Bodies, written: Written) -> Bodies:
+def _with_points(bodies: Bodies, written: Written) -> Bodies:
     """The table with a body without mass at each key body that is a point of another, such as a hand of a forearm."""
     for role, (body, place) in written.key_bodies.items():
-        if body not in bodies:
-            raise BadInput(f"{path}: key_bodies.{role}", f"a body of the model: {', '.join(bodies)}"[:400], body[:60])
         if place is not None:
             bodies[role] = {
                 "parent": body,

@@ -12,7 +12,8 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_text
-from bumblebee.robot.drives import explicit_drives
+from bumblebee.robot.drives import ON_JOINT, explicit_drives
+from bumblebee.robot.model_size import LARGEST, refuse_multiplied
 from bumblebee.robot.shapes import Bodies, capsule, floats
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -23,7 +24,6 @@ _SIMPLE = {
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
 }
-_LARGEST = 64 << 20  # bytes of the XML itself
 _THINNEST = 0.005  # m of a shape that an inertia stands for
 
 
@@ -43,6 +43,9 @@ def bodies_of(path: Path) -> Bodies:
     bodies: Bodies = {}
     for body in own:
         name = model.body(body).name
+        if not name:
+            above = model.body(int(model.body_parentid[body])).name
+            raise BadInput(f"{path}: a body of {above or 'the world'}", "a name", "none", "Write `name` in it.")
         facts = _frame(model, body)
         facts["parent"] = "world" if body == root else model.body(int(model.body_parentid[body])).name
         if body != root and (joint := _joint(path, model, body)):
@@ -54,9 +57,12 @@ def bodies_of(path: Path) -> Bodies:
 
 
 def _compiled(path: Path) -> mujoco.MjModel:
-    text = read_text(path, _LARGEST)
+    text = read_text(path, LARGEST)
     if "\0" in text or "<mujoco" not in text:
         raise BadInput(path, "an MJCF model", "another file")
+    if "<include" in text:
+        raise BadInput(path, "a model in one file", "an `include`", "Write it whole: mujoco.mj_saveLastXML does.")
+    refuse_multiplied(path, text)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         for geom in list(spec.geoms):
@@ -79,8 +85,9 @@ def _root(path: Path, model: mujoco.MjModel) -> int:
         raise BadInput(
             path, "a base with a `freejoint`", "a model without one", "A robot that is bolted down cannot fall."
         )
-    if model.neq:
-        raise BadInput(path, "joints that move by themselves", f"{model.neq} equalities between joints or bodies")
+    if model.neq or model.ntendon:
+        came = f"{model.neq} equalities and {model.ntendon} tendons between joints or bodies"
+        raise BadInput(path, "joints that move by themselves", came)
     return max(free, key=lambda body: int((model.body_rootid == body).sum()))
 
 
@@ -107,6 +114,8 @@ def _joint(path: Path, model: mujoco.MjModel, body: int) -> dict[str, Any] | Non
         raise BadInput(f"{path}: {model.body(body).name}", "one hinge a body", came)
     if np.abs(model.jnt_pos[first]).max() > 1e-6:
         raise BadInput(f"{path}: {joint.name}", "a joint at its body's origin", "one beside it")
+    if model.jnt_stiffness[first] or model.qpos0[model.jnt_qposadr[first]]:
+        raise BadInput(f"{path}: {joint.name}", "a joint without a spring, at 0 in the model's pose", "another")
     if not model.jnt_limited[first]:
         raise BadInput(f"{path}: {joint.name}", "a range", "none", "Write one: a policy's targets end there.")
     dof = int(model.jnt_dofadr[first])
@@ -123,20 +132,22 @@ def _joint(path: Path, model: mujoco.MjModel, body: int) -> dict[str, Any] | Non
     ):
         if value > 0:
             told[key] = float(value)
-    return told | _drive(model, first)
+    return told | _drive(path, model, first)
 
 
-def _drive(model: mujoco.MjModel, joint: int) -> dict[str, float]:
-    """Torque limit and servo gains of the actuator on a joint, as far as the model says them."""
+def _drive(path: Path, model: mujoco.MjModel, joint: int) -> dict[str, float]:
+    """Torque limit and servo gains of the actuator on a joint, at the joint, as far as the model says them."""
+    own = [a for a in range(model.nu) if model.actuator_trntype[a] in ON_JOINT and model.actuator_trnid[a, 0] == joint]
+    if len(own) > 1:
+        raise BadInput(f"{path}: {model.joint(joint).name}", "one drive", f"{len(own)} actuators")
     found: dict[str, float] = {}
-    for actuator in range(model.nu):
-        if model.actuator_trnid[actuator, 0] != joint:
-            continue
+    for actuator in own:
+        gear = abs(float(model.actuator_gear[actuator, 0]))
         if model.actuator_forcelimited[actuator]:
-            found["effort_limit"] = float(model.actuator_forcerange[actuator, 1])
+            found["effort_limit"] = gear * float(np.abs(model.actuator_forcerange[actuator]).min())
         if model.actuator_biasprm[actuator, 1] < 0:
-            found["kp"] = -float(model.actuator_biasprm[actuator, 1])
-            found["kd"] = -float(model.actuator_biasprm[actuator, 2])
+            found["kp"] = -(gear**2) * float(model.actuator_biasprm[actuator, 1])
+            found["kd"] = -(gear**2) * float(model.actuator_biasprm[actuator, 2])
     return found
 
 

@@ -16,9 +16,11 @@ ROLES = (
 """The 14 bodies whose positions are tracked ("keypoints"), by role, in the order of every array of them."""
 CORNERS = 4
 EVERY = "every"
-"""In `motors`: what is said of all joints that have no line of their own for it."""
+"""In `motors`: what is said of all joints, in the place of the model's, but for those with a line of their own."""
 MOTOR = ("kp", "kd", "effort_limit", "velocity_limit", "armature", "damping", "frictionloss")
 """Keys that `motors` may say of a joint: N m/rad, N m s/rad, N m, rad/s, kg m^2, N m s/rad, N m."""
+_MAY_BE_0 = ("kd", "damping", "frictionloss")
+_LEAST = 1e-6  # of a torque, a speed, a rotor or a stiffness, all of which something is divided by
 _LONGEST = 100
 _FAR = 10.0  # m
 
@@ -123,7 +125,9 @@ def _motors(where: str, said: Any) -> dict[str, dict[str, float]]:
         own = _table(f"{where}.{name}", table)
         if unknown := [str(key) for key in own if key not in MOTOR]:
             raise BadInput(f"{where}.{name}", ", ".join(MOTOR), f"unknown {unknown[0][:40]!r}")
-        found[str(name)] = {key: _number(f"{where}.{name}.{key}", own[key], 0.0, 1e5, "") for key in own}
+        found[str(name)] = {
+            key: _number(f"{where}.{name}.{key}", own[key], 0.0 if key in _MAY_BE_0 else _LEAST, 1e5, "") for key in own
+        }
     return found
 
 

@@ -50,7 +50,7 @@ def test_results_come_in_the_order_of_the_items(processes, count):
 
 
 def test_a_process_computes_on_one_core(monkeypatch):
-    """Two that use both cores for a matrix wait for each other: a motion onto 29 joints took 70 s, not 0.5."""
+    """Those that use all cores for a matrix wait for each other: beside two of them a motion took 70 s, not 0.5."""
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     assert set(in_order(os.getenv, ["OMP_NUM_THREADS"] * 12, 2)) == {"1"}
 

@@ -64,3 +64,9 @@ def test_the_folder_has_the_model_as_it_was_and_a_picture_with_every_role(tmp_pa
     assert all(role in picture for role in ("left_hand", "right_knee", "torso"))
     with pytest.raises(BadInput, match="expected a new folder"):
         draft_folder(tmp_path / "made.xml", tmp_path / "robot")
+    draft_folder(tmp_path / "made.xml", tmp_path / "robot", overwrite=True)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("...")
+    with pytest.raises(BadInput, match="or a robot's folder to replace, came something else"):
+        draft_folder(tmp_path / "made.xml", tmp_path / "mine", overwrite=True)
+    assert (tmp_path / "mine" / "thesis.tex").exists()

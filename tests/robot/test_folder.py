@@ -76,7 +76,14 @@ def test_a_box_becomes_the_capsule_along_its_longest_side_and_a_link_without_sha
         ({"colour": "red"}, "came unknown 'colour'"),
         ({"bodies": "x.yaml"}, "`model`, the maker's MJCF, or `bodies`.*came both or neither"),
         ({"model": "../made.xml"}, "expected the name of a file beside it"),
-        ({"held": ["tail"]}, "tail: expected a joint of the model: l_yaw"),
+        ({"held": ["tail"]}, "held: expected joints of the model: l_yaw.*, came tail"),
+        ({"stand": {"l_bendd": 0.3}}, "stand: expected joints of the model: l_yaw.*, came l_bendd"),
+        ({"head": ["hat", [0, 0, 0]]}, "head: expected a body of the model: hips.*, came hat"),
+        (
+            {"motors": {"every": {"velocity_limit": 9.0, "kp": 50.0}}},
+            "l_yaw: expected kp and kd of a servo",
+        ),
+        ({"motors": {"every": {"velocity_limit": 0}}}, r"motors\.every\.velocity_limit: expected a number from 1e-06"),
         ({"motors": {"l_bend": {"power": 3}}}, r"motors\.l_bend: expected kp, .*, came unknown 'power'"),
         ({"motors": {}}, "its velocity_limit, came neither in the model nor in `motors`"),
         ({"sole_radius": "1 cm"}, "sole_radius: expected a number from 0.0001 to 0.1 m"),
@@ -91,16 +98,44 @@ def test_a_file_that_does_not_fit_is_one_line(tmp_path: Path, changed: dict, lin
         read_folder(folder(tmp_path, **changed))
 
 
-def test_a_key_body_that_the_model_does_not_have(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("pelvis: hips", "pelvis: chest", r"key_bodies\.pelvis: expected hips, the body that floats, came chest"),
+        ("left_knee: l_shin", "left_knee: shin", r"key_bodies\.left_knee: expected a body of the model.*, came shin"),
+    ],
+)
+def test_a_role_that_the_model_cannot_play(tmp_path: Path, old: str, new: str, line: str) -> None:
     file = folder(tmp_path)
-    file.write_text(file.read_text().replace("left_knee: l_shin", "left_knee: shin"))
-    with pytest.raises(BadInput, match=r"key_bodies\.left_knee: expected a body of the model: hips.*, came shin"):
+    assert old in file.read_text()
+    file.write_text(file.read_text().replace(old, new))
+    with pytest.raises(BadInput, match=line):
         read_folder(file)
+
+
+def test_a_point_has_no_name_that_a_body_has(tmp_path: Path) -> None:
+    (tmp_path / "made.xml").write_text(mjcf().replace('"l_cross"', '"left_hand"'))
+    draft_folder(tmp_path / "made.xml", tmp_path / "robot")
+    with pytest.raises(BadInput, match=r"key_bodies\.left_hand: expected the model's own body left_hand, came a point"):
+        read_folder(tmp_path / "robot" / "robot.yaml")
+
+
+def test_a_gear_counts_in_torque_and_gains(tmp_path: Path) -> None:
+    servo = '<position joint="nod" kp="3" kv="0.5" gear="10" forcerange="-2 2"/>'
+    (tmp_path / "made.xml").write_text(mjcf().replace('<motor joint="nod" ctrlrange="-10 10"/>', servo))
+    nod = bodies_of(tmp_path / "made.xml")["skull"]["joint"]
+    assert (nod["effort_limit"], nod["kp"], nod["kd"]) == pytest.approx((20.0, 300.0, 50.0))
 
 
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
+        ("<actuator>", '<tendon><fixed><joint joint="nod" coef="1"/></fixed></tendon><actuator>', "and 1 tendons"),
+        ('<body name="skull"', "<body", "a body of chest: expected a name, came none"),
+        ('name="nod" axis', 'name="nod" stiffness="3" axis', "nod: expected a joint without a spring"),
+        ('<motor joint="nod"', '<motor joint="nod"/><motor joint="nod"', "nod: expected one drive, came 2"),
+        ("<worldbody>", '<include file="legs.xml"/><worldbody>', "a model in one file, came an `include`"),
+        ("<worldbody>", '<worldbody><replicate count="999999"><geom size="1"/></replicate>', "a replicate of at most"),
         ("<freejoint/>", "", "expected a base with a `freejoint`, came a model without one"),
         (
             '<joint name="spin" axis="0 0 1" range="-1.5 1.5"/>',
