@@ -1,7 +1,6 @@
 """Command line of the loop: `bumblebee demo`, `serve`, `report`, `fetch`; modules are imported when they are called."""
 
 import argparse
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +10,6 @@ import typer
 
 from bumblebee.commands.view import PORT, Meshes, Port, Ticks, play_shipped_policy
 from bumblebee.errors import BadInput
-from bumblebee.robot.which import VARIABLE
 
 Name = Annotated[str, typer.Option("--name", help="Workspace under runs/; without, the checkout itself.")]
 PrefectPort = Annotated[int, typer.Option("--prefect-port", help="Port of Prefect's server; 0: a free one.")]
@@ -20,6 +18,7 @@ MlflowPort = Annotated[int, typer.Option("--mlflow-port", help="Port of MLflow's
 
 
 def demo(
+    context: typer.Context,
     view: Annotated[bool, typer.Option("--view", help="Play the shipped policy in the browser.")] = False,
     motions: Annotated[Path | None, typer.Option("--motions", help="Motion files, not the embedded ones.")] = None,
     name: Annotated[str, typer.Option("--name", help="Workspace under runs/; by default after --motions.")] = "",
@@ -39,7 +38,6 @@ def demo(
         play_shipped_policy(port, meshes, ticks)
         return
     require_checkout("demo")
-    chosen = os.environ.get(VARIABLE, "")  # before `tasks` says whose folder this is
     from bumblebee.last_line import guarded
     from flows.demo import started
 
@@ -49,7 +47,7 @@ def demo(
         "workspace": workspace,
         "profile": profile,
         "seed": seed,
-        "robot": robot or chosen,
+        "robot": robot or context.find_root().params.get("robot", ""),
     }
     more = {"prefect_port": prefect_port, "mlflow_port": mlflow_port, "verbose": verbose}
     raise typer.Exit(guarded(lambda: started(argparse.Namespace(**options, **more))))

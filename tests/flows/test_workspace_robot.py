@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from bumblebee import cli
 from bumblebee.errors import BadInput
 from bumblebee.new_robot.first_folder import draft_folder
 from flows import workspace as workspaces
@@ -55,3 +56,18 @@ def test_what_comes_along_for_the_g1_is_refused_of_another_robot(tmp_path: Path,
     came = subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=120)
     assert came.returncode == 2
     assert line in came.stderr
+
+
+def test_the_robot_before_the_command_is_the_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr("flows.demo.started", lambda options: asked.append(options.robot) or 0)
+    monkeypatch.setenv("BUMBLEBEE_ROBOT", "")  # put back what `--robot` sets
+    for words in (
+        ["--robot", "h1", "demo"],
+        ["demo", "--robot", "g1_29"],
+        ["--robot", "h1", "demo", "--robot", "g1_29"],
+    ):
+        assert cli.run(words) == 0
+    monkeypatch.setenv("BUMBLEBEE_ROBOT", "h1")  # as `tasks` sets it in any process that imports it
+    assert cli.run(["demo"]) == 0
+    assert asked == ["h1", "g1_29", "g1_29", ""]
