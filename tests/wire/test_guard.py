@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bumblebee.wire.clock import SECOND
 from bumblebee.wire.messages import Mode
-from bumblebee.wire.safety.guard import PERIOD
+from bumblebee.wire.safety.guard import PERIOD, Guard
 from bumblebee.wire.safety.limits import Limits
 from bumblebee.wire.safety.phases import Phase, Ramps
 from bumblebee.wire.safety.rules import RULES, Step, Wish, cut, torque_of
@@ -166,6 +167,18 @@ def test_a_robot_that_never_speaks_is_given_up() -> None:
     small.run(1.0)
     assert small.guard.finished and small.guard.reason == "silent"
     assert {tick.order.mode for tick in small.ticks} == {Mode.OFF}
+
+
+@pytest.mark.parametrize("up", [0.0, 86_400.0], ids=["booted", "up for a day"])
+def test_a_robot_whose_first_state_has_heard_nothing_yet_is_deaf_only_once_its_limit_is_over(up: float) -> None:
+    begun, unheard = round(up * SECOND), state(heard=-1, controller=0, mode=Mode.OFF)
+    guard = Guard(plan(), drives(), begun)
+    for tick in range(1, 200):
+        now = begun + tick * PERIOD
+        if tick >= 3:  # orders went out before this robot was there to hear them
+            guard.heard(now, replace(unheard, sequence=tick, stamp_ns=tick * PERIOD))
+        guard.tick(now)
+        assert (guard.reason == "deaf") == ((tick - 3) * TICK > LIMITS.deaf), tick
 
 
 def test_an_answer_to_an_older_question_counts_for_nothing() -> None:

@@ -223,7 +223,7 @@ class Guard:
             carries=self.phase is Phase.RUN,
             state_age=self.intake.age(now),
             policy_late=late,
-            deaf=self._watch.deaf(state, now, self._sequence),
+            deaf=self._watch.deaf(state, now),
             key_age=(now - self._keys.held_ns) / SECOND if attended and moving else 0.0,
             console_age=(now - self._keys_came) / SECOND,
             stops=self._keys.stops,

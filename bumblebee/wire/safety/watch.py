@@ -22,7 +22,8 @@ class Watch:
         """Time without a foot on the floor [s]; 0 where no force is measured."""
         self.stalled = np.zeros(len(drives.joints))
         """(J,) time at the torque limit without motion [s]."""
-        self._heard, self._heard_at = -1, 0
+        self._heard: int | None = None
+        self._heard_at = 0
 
     def look(self, state: State, over: np.ndarray, carries: bool) -> None:
         """Look at a state; `over` (J,) bool are the drives that are cut at their torque."""
@@ -31,9 +32,8 @@ class Watch:
         still = np.abs(state.joint_vel) < self._limits.still * self._drives.speed
         self.stalled = np.where(over & still, self.stalled + self._period, 0.0)
 
-    def deaf(self, state: State | None, now: int, sent: int) -> float:
-        """Time [s] since the robot last took a new order of the `sent` ones."""
-        heard = state.heard if state is not None else -1
-        if heard != self._heard or sent == 0:
-            self._heard, self._heard_at = heard, now
+    def deaf(self, state: State, now: int) -> float:
+        """Time [s] since the robot last took a new order, or since its first state where it took none."""
+        if state.heard != self._heard:
+            self._heard, self._heard_at = state.heard, now
         return (now - self._heard_at) / SECOND
