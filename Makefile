@@ -4,6 +4,8 @@ PYTHON ?= python3
 VENV ?= .venv
 MOTIONS ?=
 ROBOT ?=
+POLICY ?=
+PROFILE ?=
 SEED ?=
 NAME ?=
 PORTS ?=
@@ -62,8 +64,8 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 # A gate that waits for an answer (status 3) is no error; scripts that must know call python -m flows.demo themselves.
 WAITS = || { status=$$?; test $$status -eq 3 || exit $$status; echo "make $@: not done, a gate waits for your answer (see above); then the same command goes on"; }
 
-demo: setup  ## the whole loop on embedded motions, or on MOTIONS=<folder>; SEED=<n> or null: another sealed robot; ROBOT=<name or folder>; VERBOSE=1 shows every line
-	@$(BIN)/python -m flows.demo $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(SEED),--seed "$(SEED)") $(if $(ROBOT),--robot "$(ROBOT)") $(if $(NAME),--name "$(NAME)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)
+demo: setup  ## the whole loop on embedded motions, or on MOTIONS=<folder>; SEED=<n> or null: another sealed robot; ROBOT=<name or folder>, POLICY=<folder>: yours; PROFILE=<file of profiles/>; VERBOSE=1 shows every line
+	@$(BIN)/python -m flows.demo $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(SEED),--seed "$(SEED)") $(if $(ROBOT),--robot "$(ROBOT)") $(if $(POLICY),--policy "$(POLICY)") $(if $(PROFILE),--profile "$(PROFILE)") $(if $(NAME),--name "$(NAME)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)
 
 smoke: setup  ## the loop with tiny budgets, in runs/smoke
 	@$(BIN)/python -m flows.demo --profile smoke --name $(or $(NAME),smoke) $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(ROBOT),--robot "$(ROBOT)") $(if $(VERBOSE),--verbose) $(PORTS) $(WAITS)

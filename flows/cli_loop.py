@@ -26,6 +26,7 @@ def demo(
     profile: Annotated[str, typer.Option("--profile", help="File of profiles/ on top of params.yaml.")] = "",
     seed: Annotated[str, typer.Option("--seed", help="Seed of the sealed robot, or `null`: it lacks nothing.")] = "",
     robot: Annotated[str, typer.Option("--robot", help="A robot's folder, or a name of `robot list`.")] = "",
+    policy: Annotated[Path | None, typer.Option("--policy", help="A policy of yours to begin from, a folder.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", help="Show every line of every stage.")] = False,
     prefect_port: PrefectPort = 0,
     mlflow_port: MlflowPort = 0,
@@ -47,6 +48,7 @@ def demo(
         "workspace": workspace,
         "profile": profile,
         "seed": seed,
+        "policy": policy,
         "robot": robot or context.find_root().params.get("robot", ""),
     }
     more = {"prefect_port": prefect_port, "mlflow_port": mlflow_port, "verbose": verbose}

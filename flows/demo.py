@@ -51,11 +51,11 @@ def folder_of(options: argparse.Namespace) -> Path:
     Raises:
         BadInput: `--workspace` with an option that would change it.
     """
-    asked = (options.name, options.profile, options.motions, options.seed, options.robot)
+    asked = (options.name, options.profile, options.motions, options.seed, options.robot, options.policy)
     if options.workspace is None:
         return choose(*asked)
     if any(asked):
-        names = ("--name", "--profile", "--motions", "--seed", "--robot")
+        names = ("--name", "--profile", "--motions", "--seed", "--robot", "--policy")
         came = ", ".join(name for name, value in zip(names, asked, strict=True) if value)
         do = f"Leave one out, or change {options.workspace / 'params.yaml'}."
         raise BadInput("--workspace", "a workspace as it is", f"{came} beside it", do)
@@ -71,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--profile", default="", help="file of profiles/ whose values replace those of params.yaml")
     made.add_argument("--seed", default="", help="seed of the robot that is sealed, or `null`: nothing undeclared")
     made.add_argument("--robot", default="", help="robot's folder, or one of `bumblebee robot list`")
+    made.add_argument("--policy", type=Path, help="folder of a policy of yours to begin from")
     made.add_argument("--verbose", action="store_true", help="show every line of every stage, not one a stage")
     add_ports(made)
     return made
@@ -82,16 +83,18 @@ def add_ports(made: argparse.ArgumentParser) -> None:
     made.add_argument("--mlflow-port", type=int, default=0, help="port of MLflow's server (default: a free one)")
 
 
-def choose(name: str, profile: str, motions: Path | None, seed: str = "", robot: str = "") -> Path:
+def choose(
+    name: str, profile: str, motions: Path | None, seed: str = "", robot: str = "", policy: Path | None = None
+) -> Path:
     """The checkout itself, or the workspace that the options ask for, made or brought up to date."""
-    if not (name or profile or motions or seed or robot):
+    if not (name or profile or motions or seed or robot or policy):
         return workspaces.HOME
     sealed = robot_of(seed)
     if motions is not None and not name:
         name = motions.expanduser().resolve().name
-    name = name or profile or (f"seed-{seed}" if seed else Path(robot).name)
+    name = name or profile or (f"seed-{seed}" if seed else Path(robot or policy or "").name)
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", name)
-    return workspaces.create(workspaces.HOME / "runs" / name, profile or None, motions, robot, **sealed)
+    return workspaces.create(workspaces.HOME / "runs" / name, profile or None, motions, robot, policy, **sealed)
 
 
 def robot_of(seed: str) -> dict[str, dict[str, int]]:

@@ -24,6 +24,7 @@ from tasks.settings.filter_files import files_named
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
 FIELD_BASE = "none"  # who brings motions has, on the robot, odometry to act on and no motion capture to log
+POLICY = ("policy.pt", "card.json")  # files of a policy that a loop goes on from
 _RAW = paths.RAW.parts
 GENERATED = ".params.generated.yaml"  # what params.yaml was when it was last made here
 
@@ -37,7 +38,14 @@ def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def create(folder: Path, profile: str | None = None, motions: Path | None = None, robot: str = "", **over: Any) -> Path:
+def create(
+    folder: Path,
+    profile: str | None = None,
+    motions: Path | None = None,
+    robot: str = "",
+    policy: Path | None = None,
+    **over: Any,
+) -> Path:
     """Make `folder` a workspace, or bring an existing one up to date; its data, models and history stay.
 
     A params.yaml that was edited here stays as it is, but for what the call itself asks for.
@@ -47,10 +55,12 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         profile: the name of a file in profiles/ whose values replace those of params.yaml.
         motions: a folder of motion files to use in place of the embedded ones.
         robot: a robot that comes along, or a robot's folder, in place of the one that is there or of the checkout's.
+        policy: a policy of `bumblebee train` to begin from, in place of those that come along; nothing trains before
+            the refinement but what the settings ask for.
         over: further sections of params.yaml to replace.
 
     Raises:
-        BadInput: for an unknown profile or a missing folder of motions.
+        BadInput: for an unknown profile, a missing folder of motions or of a policy.
     """
     content, edited = settings_of(folder, profile)
     if motions is not None:
@@ -59,6 +69,10 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
             raise BadInput(source, "a folder of motion files", "no such folder", "Check MOTIONS.")
         content = merge(content, {"motions": {"source": str(source)}})
         content = merge({"rollouts": {"base": FIELD_BASE}}, content)  # unless the settings say otherwise
+    if policy is not None:
+        if not (policy / POLICY[0]).is_file():
+            raise BadInput(policy, f"a policy of `bumblebee train` ({POLICY[0]})", "none", "Check POLICY.")
+        content = merge(content, {"base": {"init": "own", "learner": "none"}})
     content = merge(content, over)
     folder.mkdir(parents=True, exist_ok=True)
     for name in CODE:
@@ -73,9 +87,12 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     if edited is None:
         _write(folder / GENERATED, text)
     _write_robot(folder / paths.ROBOT, robot)
-    for place in (paths.INCOMING, paths.RAW):
+    for place in (paths.INCOMING, paths.RAW, paths.POLICY):
         (folder / place).mkdir(parents=True, exist_ok=True)
         _write(folder / place / "README.md", (HOME / place / "README.md").read_text())
+    if policy is not None:
+        found = [HOME / paths.POLICY / "README.md", *(policy / name for name in POLICY if (policy / name).is_file())]
+        _fill(folder / paths.POLICY, {file.name: file.read_bytes() for file in found})
     if not (folder / ".dvc" / "config").exists():
         init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
         subprocess.run(init, cwd=folder, env=environment(folder), check=True)
@@ -100,6 +117,11 @@ def _write_robot(place: Path, robot: str) -> None:
         return
     else:
         files = {file.name: file.read_bytes() for file in (HOME / paths.ROBOT).iterdir()}
+    _fill(place, files)
+
+
+def _fill(place: Path, files: dict[str, bytes]) -> None:
+    """Let a folder hold these files and no other, put there together; where it does already it stays untouched."""
     there = {file.name: file.read_bytes() for file in place.iterdir()} if place.is_dir() else {}
     if there != files:
         with new_folder(place) as fresh:

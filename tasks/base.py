@@ -15,10 +15,11 @@ from tasks.running.stage import load, run_stage
 class BaseConfig(TrainingConfig):
     """The training of the base policy."""
 
-    init: Literal["pretrained", "randomised", "scratch"] = "pretrained"
-    """Go on from a policy that comes with BumbleBee, with its layers, or from nothing. The pretrained one has seen
-    the embedded library's training clips and real motions (bumblebee/learning/pretrained/README.md); the randomised one
-    real motions on robots that differ, with delays (pretrained/randomised/README.md)."""
+    init: Literal["pretrained", "randomised", "own", "scratch"] = "pretrained"
+    """Go on from a policy that comes with BumbleBee, or from your own in data/policy (`make demo POLICY=`), with its
+    layers, or from nothing. The pretrained one has seen the embedded library's training clips and real motions
+    (bumblebee/learning/pretrained/README.md); the randomised one real motions on robots that differ, with delays
+    (pretrained/randomised/README.md)."""
 
     def __post_init__(self) -> None:
         """Refuse a policy from nothing that nobody trains."""
@@ -32,7 +33,8 @@ def main() -> None:
     clips = training_clips()
     world = World(load_model(physics_hz=config.env.physics_hz), threads=config.env.threads)
     own = [clip for clip in clips if clip.split == "train"]
-    parent = {"pretrained": pretrained.FOLDER, "randomised": pretrained.RANDOMISED}.get(config.init)
+    begun = {"pretrained": pretrained.FOLDER, "randomised": pretrained.RANDOMISED, "own": paths.POLICY}
+    parent = begun.get(config.init)
     train_policy(Job("base", "base", paths.BASE, own, clips, world, parent=parent), config)
 
 

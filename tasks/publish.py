@@ -15,7 +15,7 @@ from bumblebee.measured import gate, gate_words
 from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.ranges import Ranged
 from tasks import registry
-from tasks.policies.came_along import came_along
+from tasks.policies.came_along import seen_before
 from tasks.policies.model_card import Evaluated, licences_of, model_card
 from tasks.promotion.gate import Promotion, PromotionConfig, settle
 from tasks.promotion.rule import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
@@ -213,8 +213,8 @@ def publish(
     tags |= {name: f"{value:.6g}" for name, value in metrics.items() if value is not None}
     evaluated = Evaluated(standard.contract, standard.engine, result)
     licences = licences_of(paths.FILTERED)
-    began = came_along(paths.BASE)
-    card = model_card(candidate.model, candidate.policy, candidate.folder, candidate.parent, evaluated, licences, began)
+    known = seen_before(paths.BASE)
+    card = model_card(candidate.model, candidate.policy, candidate.folder, candidate.parent, evaluated, licences, known)
     version = registry.register(candidate.model, candidate.folder, tags, metrics, card)
     if verdict.promoted and not standard.asks:
         registry.set_alias(candidate.model, CHAMPION, version)

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from bumblebee.evaluation.summary import comparisons
-from bumblebee.learning.pretrained import NAMES
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.measured.wire_note import noted_latency
 from bumblebee.motion.store import read_index
@@ -28,6 +27,7 @@ from bumblebee.report.sections.round_sections import round_section
 from bumblebee.report.wording import plural
 from tasks.pages.film import film_blocks
 from tasks.pages.replays import replays
+from tasks.policies.came_along import began
 from tasks.running import paths
 from tasks.running.lineage import git_sha
 from tasks.running.stage import load, log_run, output_file, run_stage
@@ -90,7 +90,7 @@ def collect(shape: Loop) -> LoopResults:
         published=_json(paths.PUBLISHED),
         sealed=sealed_truth(wire),
         rounds=tuple(round_results(turn, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
-        pretrained=base.get("parent") in NAMES.values(),
+        began=began(paths.BASE),
         base_trained_on=base.get("kept") != "parent",
         points=pd.read_parquet(points) if (points := paths.CLUSTERS / "map.parquet").exists() else None,
         wire=wire,

@@ -1,4 +1,4 @@
-"""Excitation of the robots: an arm follows sums of sines and rests, a G1 stands, shifts its weight and moves its arms.
+"""Excitation of the robots: an arm follows sums of sines and rests, a humanoid stands, shifts weight, moves its arms.
 
 A plan gives the target of every tick from the robot's true state, so that a standing robot can balance.
 """
@@ -8,10 +8,12 @@ from typing import Protocol
 
 import numpy as np
 
-from bumblebee.robot.facts import stand_pose
+from benchmarks.undeclared.balance import balance_of
+from bumblebee.robot.facts import ANKLE_JOINTS, SIDES, limb
 from bumblebee.stand_in.undeclared.declared import Declared
 
 HZ = 50.0
+_LOW = 0.015  # m, by which a standing robot lowers its hips at most
 
 
 class Plan(Protocol):
@@ -50,49 +52,26 @@ class ArmPlan:
         return self._targets[tick]
 
 
-# Feedback of the balance on ankles and hips: target [rad] per rad, m, m/s and rad/s. Found by random search in
-# simulation of the declared robot; they hold it up for 8 s under the motions below.
-_PITCH, _ROLL, _HIP_PITCH, _HIP_ROLL = (7.02, 8.82, 4.8, 0.4), (-0.07, -4.23, -1.26, 0.6), (2.66, 0.02), (-0.86, -0.11)
-
-
 class StandPlan:
-    """Balance by ankles and hips from the true state of the base; arms, waist and legs move; it squats a little."""
+    """Balance from the true state of the base; arms, trunk and legs move; it squats a little."""
 
     def __init__(self, robot: Declared, count: int, seconds: float, rng: np.random.Generator) -> None:
-        self.ticks = round(seconds * HZ)
-        model = robot.spec.compile()
-        self.qpos = np.tile(model.key("stand").qpos, (count, 1))
-        self.qvel = np.zeros((count, model.nv))
-        self._home, self._names = self.qpos[0].copy(), list(robot.joints)
-        time, joints = np.arange(self.ticks) / HZ, len(robot.joints)
-        reach = rng.uniform(0.3, 1, (count, 3, joints, 1)) * np.array([_reach(n) for n in robot.joints])[:, None]
+        self.ticks, joints = round(seconds * HZ), len(robot.joints)
+        self._balance = balance_of(robot, HZ)
+        self.qpos = np.tile(self._balance.home, (count, 1))
+        self.qvel = np.zeros((count, self._balance.model.nv))
+        time = np.arange(self.ticks) / HZ
+        reach = rng.uniform(0.3, 1, (count, 3, joints, 1)) * _reach(robot)[:, None]
         rate, phase = rng.uniform(0.15, 1.2, (count, 3, joints, 1)), rng.uniform(0, 2 * np.pi, (count, 3, joints, 1))
         ramp = np.clip(time / 1.5, 0, 1)
-        moves = (reach * np.sin(2 * np.pi * rate * time + phase)).sum(axis=1) * ramp
-        squat = rng.uniform(0, 0.12, (count, 1)) * np.sin(2 * np.pi * rng.uniform(0.2, 0.5, (count, 1)) * time) * ramp
-        for side in ("left", "right"):
-            for part, share in (("hip_pitch", -1), ("knee", 2), ("ankle_pitch", -1)):
-                moves[:, self._column(side, part)] += share * squat
-        self._targets = np.moveaxis(moves, -1, 0) + stand_pose()
+        moves = (reach * np.sin(2 * np.pi * rate * time + phase)).sum(axis=1) * ramp  # (R, J, T)
+        low = rng.uniform(0, _LOW, (count, 1)) * np.sin(2 * np.pi * rng.uniform(0.2, 0.5, (count, 1)) * time) * ramp
+        self._low = low.T
+        self._moves = np.moveaxis(moves, -1, 0) + self._low[:, :, None] * self._balance.lower
 
     def target(self, tick: int, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
         """The motions and the feedback."""
-        w, x, y, z = qpos[:, 3:7].T
-        pitch, roll = 2 * (w * y - z * x), 2 * (w * x + y * z)
-        ahead, aside = qpos[:, 0] - self._home[0], qpos[:, 1] - self._home[1]
-        body = _base_velocity(qpos[:, 3:7], qvel[:, :3])
-        ankle_pitch = _PITCH @ np.stack((pitch, ahead, body[:, 0], qvel[:, 4]))
-        ankle_roll = _ROLL @ np.stack((roll, aside, body[:, 1], qvel[:, 3]))
-        hip_pitch, hip_roll = _HIP_PITCH @ np.stack((pitch, qvel[:, 4])), _HIP_ROLL @ np.stack((roll, qvel[:, 3]))
-        out = self._targets[tick].copy()
-        parts = (("ankle_pitch", ankle_pitch), ("ankle_roll", ankle_roll))
-        for side in ("left", "right"):
-            for part, change in (*parts, ("hip_pitch", hip_pitch), ("hip_roll", hip_roll)):
-                out[:, self._column(side, part)] += change
-        return out
-
-    def _column(self, side: str, part: str) -> int:
-        return self._names.index(f"{side}_{part}_joint")
+        return self._balance.targets(self._moves[tick], self._low[tick], qpos, qvel)
 
 
 def fallen(qpos: np.ndarray) -> np.ndarray:
@@ -102,18 +81,19 @@ def fallen(qpos: np.ndarray) -> np.ndarray:
     return ~upright
 
 
-def _reach(name: str) -> float:
-    for words, reach in ((("shoulder", "elbow"), 0.3), (("waist_yaw",), 0.1), (("waist",), 0.025), (("ankle",), 0.008)):
-        if any(word in name for word in words):
-            return reach
-    return 0.025
+def _reach(robot: Declared) -> np.ndarray:
+    """Amplitude (J,) [rad] of each of a joint's sines: arms move, the trunk turns, legs and trunk shift the weight."""
+    arms = {name for side in SIDES for name in limb(side, "hand")}
+    legs = {name for side in SIDES for name in limb(side, "foot")}
 
+    def of(name: str) -> float:
+        if name in arms:
+            return 0.3
+        if name in ANKLE_JOINTS:
+            return 0.008
+        return 0.1 if name not in legs and abs(robot.spec.joint(name).axis[2]) > 0.9 else 0.025
 
-def _base_velocity(quat: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """World velocities (R, 3) in the frames of wxyz quaternions (R, 4)."""
-    axis = -quat[:, 1:]
-    cross = 2 * np.cross(axis, velocity)
-    return velocity + quat[:, :1] * cross + np.cross(axis, cross)
+    return np.array([of(name) for name in robot.joints])
 
 
 def make_plan(

@@ -13,7 +13,7 @@ import numpy as np
 
 from bumblebee.stand_in.undeclared.kinds import CATALOGUE, KINDS, LATER, OUTSIDE, fits
 
-VERSION = 7  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
+VERSION = 8  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Case:
 
     number: int
     robot: str
-    """arm, stand (the G1 balancing) or track (the G1 under a policy)."""
+    """arm, stand (the humanoid of this process, balancing) or track (the G1 under a policy)."""
     group: str
     """single, pair, triple, null, outside."""
     kinds: tuple[str, ...]

@@ -1,6 +1,5 @@
 """Card of a policy that `train` wrote: facts for programs (card.json) and for people (README.md)."""
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,14 +7,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bumblebee.errors import BadInput
 from bumblebee.evaluation.intervals import mean_by_motion, success_rate
-from bumblebee.io.read import read_json
-from bumblebee.learning import pretrained
 from bumblebee.learning.trial import success_by_family
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.licences.terms import counted
-from bumblebee.policy.card_text import CARD, NOTHING, card_text, made_from
+from bumblebee.policy.card_text import card_text, made_from
 from bumblebee.report.wording import plural
 
 SPLITS = {"train": "trained on", "test": "held out"}
@@ -59,28 +55,6 @@ def card_of(
         "learnt_before": list(known),
         "config": config,
     }
-
-
-def learnt_before(start: str) -> list[str]:
-    """Motions that a policy to go on from has learnt from, and their licences; a line for it and each of its parents.
-
-    Args:
-        start: the name of a shipped policy, a policy's folder, or "nothing".
-
-    Raises:
-        BadInput: the folder's card.json is not one of a policy.
-    """
-    if start == NOTHING:
-        return []
-    if start in pretrained.SHIPPED:
-        return [f"`{start}`: {pretrained.MOTIONS[pretrained.SHIPPED[start]]}"]
-    file = Path(start).expanduser() / CARD
-    card = read_json(file) if os.path.lexists(file) else {}
-    licences, before = (card.get("licences", {}), card.get("learnt_before", [])) if isinstance(card, dict) else (0, 0)
-    if not isinstance(licences, dict) or not isinstance(before, list):
-        raise BadInput(file, "a policy's card", "other contents", "Restore it, or remove it.")
-    told = ", ".join(f"{licence} ({count})" for licence, count in licences.items())
-    return [*map(str, before), f"`{start}`: {told or 'licences unknown, see its card'}"]
 
 
 def readme(card: dict[str, Any], contract: dict[str, Any], trials: pd.DataFrame) -> str:

@@ -104,7 +104,7 @@ def train(
         >>> (made.folder / "policy.onnx").exists()
         True
     """
-    from bumblebee.api.policy_card import learnt_before
+    from bumblebee.api.learnt import learnt_before
     from bumblebee.motion.filters.rules import filter_clips
     from bumblebee.motion.pieces import hold_out, too_few
     from bumblebee.report.wording import plural

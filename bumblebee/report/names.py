@@ -11,7 +11,7 @@ def label(results: LoopResults, policy: str) -> str:
     """`base (shipped)`, `experts-r0, compensated`, `control r1: declared model`: a policy's name with what it is."""
     if policy == SHIPPED:
         return "shipped policy"
-    if policy == BASE and results.pretrained:
+    if policy == BASE and results.began != "scratch":
         return f"base ({_origin(results)})"
     if found := re.fullmatch(r"control-(declared|delta)-r(\d+)", policy):
         return f"control r{found[2]}: {'declared model' if found[1] == 'declared' else 'delta alone'}"
@@ -35,7 +35,7 @@ def same_files(evaluation: Json, first: str, second: str) -> bool:
 def _origin(results: LoopResults) -> str:
     there = reference(results.evaluation) == SHIPPED
     trained_on = not same_files(results.evaluation, SHIPPED, BASE) if there else results.base_trained_on
-    return "shipped, trained on" if trained_on else "shipped"
+    return f"{results.began}, trained on" if trained_on else results.began
 
 
 def ladder(results: LoopResults) -> list[str]:

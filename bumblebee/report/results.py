@@ -1,7 +1,7 @@
 """Results of a finished loop, as plain values: everything that the report's sections read."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -57,8 +57,8 @@ class LoopResults:
     are of the user's robot."""
     rounds: tuple[RoundResults, ...] = ()
     """The turns with the robot."""
-    pretrained: bool = False
-    """Whether the base policy went on from the one that comes along."""
+    began: Literal["scratch", "shipped", "own"] = "scratch"
+    """Where the base policy went on from: nothing, a policy that comes along, or the lab's own."""
     base_trained_on: bool = False
     """Whether the base stage kept a policy of its own training, and not the one that it went on from."""
 

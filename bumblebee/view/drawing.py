@@ -5,7 +5,7 @@ from pathlib import Path
 
 import mujoco
 
-from bumblebee.report.films.looks import dress, is_g1
+from bumblebee.report.films.plain_looks import show
 from bumblebee.report.replays.replay import Drawn
 from bumblebee.robot.model import build_spec
 
@@ -26,10 +26,7 @@ def drawing(
     parent: mujoco.MjSpec | None = None
     for robot in robots:
         spec = make() if make else build_spec()
-        if is_g1(spec):
-            dress(spec, meshes, robot.tint)
-        elif robot.tint:
-            _paint(spec, robot.tint)
+        show(spec, meshes, robot.tint)
         _keep_bodies(spec, floor=parent is None)
         if parent is None:
             parent = spec
@@ -43,12 +40,6 @@ def drawing(
 def _put_in_group(spec: mujoco.MjSpec, group: int) -> None:
     for geom in spec.geoms:
         geom.group = group if geom.rgba[3] > 0 else geom.group
-
-
-def _paint(spec: mujoco.MjSpec, tint: tuple[float, float, float, float]) -> None:
-    for geom in spec.geoms:
-        if geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
-            geom.rgba, geom.material = tint, ""
 
 
 def _keep_bodies(spec: mujoco.MjSpec, floor: bool) -> None:

@@ -1,14 +1,13 @@
 """The model card of a policy's version, in Markdown: what it takes and gives, made from what, how good, its limits."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from bumblebee.learning.pretrained import MOTIONS, NAMES
 from bumblebee.motion.licences.terms import UNKNOWN, counted
 from bumblebee.policy.card_text import card_text, made_from
 
@@ -37,7 +36,7 @@ def model_card(
     parent: str | None,
     evaluated: Evaluated,
     licences: Mapping[str, int],
-    shipped: Path | None = None,
+    learnt_before: Sequence[str] = (),
 ) -> str:
     """The card, from contract.json and card.json of the policy's folder and its result.
 
@@ -48,11 +47,11 @@ def model_card(
         parent: name of the policy that it was trained from, None where there is none.
         evaluated: how it did.
         licences: licence -> number of motions, as `licences_of` has it.
-        shipped: the policy of BumbleBee's own that the loop went on from.
+        learnt_before: lines on what the policy that the loop went on from had learnt from.
     """
     contract = json.loads((folder / "contract.json").read_text())
     card = json.loads((folder / "card.json").read_text()) if (folder / "card.json").exists() else {}
-    card |= {"learnt_before": [f"`{NAMES[shipped]}`: {MOTIONS[shipped]}"]} if shipped else {}
+    card |= {"learnt_before": list(learnt_before)}
     lineage = "- every input with its hash: `lineage.json` beside this card"
     made = [*made_from(card, parent, licences), lineage]
     return card_text(f"{name}: {policy}", contract, {"Evaluated": _evaluated(evaluated)}, made)

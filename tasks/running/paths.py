@@ -10,6 +10,8 @@ RETARGETS = Path("data/retargets")
 """The cache of retargeted motions, by content."""
 ROBOT = Path("data/robot")
 """The robot's folder: one that comes along, or the user's."""
+POLICY = Path("data/policy")
+"""A policy of the user's own, which the loop may begin from."""
 MOTIONS = Path("data/motions")
 """The library of all motions that could be read."""
 FILTERED = Path("data/filtered")

@@ -6,6 +6,7 @@ from typing import Any
 from bumblebee.clustering.text import encoder_folder
 from bumblebee.errors import BadInput
 from bumblebee.learning import pretrained
+from bumblebee.learning.policy import FILE as POLICY
 from bumblebee.robot.facts import ROBOT
 from tasks.running import paths
 from tasks.settings.filter_files import SHIPPED
@@ -24,6 +25,9 @@ def check_sources(found: dict[str, Any], path: Path) -> None:
     motions, rollouts, ingest = found["motions"], found["rollouts"], found["ingest"]
     if ROBOT != pretrained.THEIRS:
         _require_own(found, path)
+    if found["base"].init == "own" and not (paths.POLICY / POLICY).is_file():
+        came = f"no {POLICY} in {paths.POLICY}"
+        raise BadInput(f"{path}: base.init", "a policy of `bumblebee train`", came, "make demo POLICY=<folder>")
     if motions.source != "embedded":
         place, wanted = f"{path}: motions.source", "a folder of motions or 'embedded'"
         _require(_at_home(motions.source, place, wanted), place, wanted, either=True)
@@ -62,7 +66,7 @@ def _require_own(found: dict[str, Any], path: Path) -> None:
     """Refuse what comes along for our G1 alone, of another robot's loop."""
     needs = (
         ("motions.source", found["motions"].source == "embedded", "a folder of motions", "make demo MOTIONS=<folder>"),
-        ("base.init", found["base"].init != "scratch", "scratch", "make demo PROFILE=world_model_gpu"),
+        ("base.init", found["base"].init not in ("own", "scratch"), "own or scratch", "make demo POLICY=<folder>"),
         ("filter.policy.source", found["filter"].policy.source == SHIPPED, "an exported policy's folder", ""),
     )
     for key, wrong, wanted, do in needs:

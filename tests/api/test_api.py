@@ -15,7 +15,8 @@ import torch
 import bumblebee as bb
 from bumblebee import cli
 from bumblebee.api import training
-from bumblebee.api.policy_card import learnt_before, splits, tried
+from bumblebee.api.learnt import learnt_before
+from bumblebee.api.policy_card import splits, tried
 from bumblebee.api.recipes import as_seen_by
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.motion.pieces import hold_out

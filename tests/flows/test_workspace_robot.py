@@ -47,7 +47,7 @@ def test_a_robots_folder_is_copied_whole(tmp_path: Path) -> None:
             False,
             "motions.source: expected a folder of motions, came what comes along for g1_23dof, and this is h1",
         ),
-        (True, "base.init: expected scratch, came what comes along for g1_23dof"),
+        (True, "base.init: expected own or scratch, came what comes along for g1_23dof"),
     ],
 )
 def test_what_comes_along_for_the_g1_is_refused_of_another_robot(tmp_path: Path, own_motions: bool, line: str) -> None:
@@ -56,6 +56,25 @@ def test_what_comes_along_for_the_g1_is_refused_of_another_robot(tmp_path: Path,
     came = subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=120)
     assert came.returncode == 2
     assert line in came.stderr
+
+
+def test_a_policy_of_ones_own_lies_in_the_workspace_and_must_be_there(tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    with pytest.raises(BadInput, match=r"mine: expected a policy of `bumblebee train` \(policy.pt\), came none"):
+        workspaces.create(tmp_path / "lab", policy=mine)
+    for name in ("policy.pt", "card.json", "film.html"):
+        (mine / name).write_text(name)
+    folder = workspaces.create(tmp_path / "lab", policy=mine)
+    place = folder / "data/policy"
+    assert sorted(file.name for file in place.iterdir()) == ["README.md", "card.json", "policy.pt"]
+    said = yaml.safe_load((folder / "params.yaml").read_text())["base"]
+    assert (said["init"], said["learner"]) == ("own", "none")
+    (place / "policy.pt").unlink()
+    command = [sys.executable, "-m", "tasks.sections"]
+    came = subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=120)
+    assert came.returncode == 2
+    assert "base.init: expected a policy of `bumblebee train`, came no policy.pt in data/policy" in came.stderr
 
 
 def test_the_robot_before_the_command_is_the_loops(monkeypatch: pytest.MonkeyPatch) -> None:

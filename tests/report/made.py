@@ -205,7 +205,7 @@ def won_back(sealed: list[dict[str, Any]] | None = None, effects: list[dict[str,
     }  # fmt: skip
     (turn,) = made.rounds
     turn = replace(turn, diagnosis={**turn.diagnosis, "unexplained": left}, compensation=PLAN)
-    return replace(made, evaluation=evaluation, rounds=(turn,), pretrained=True)
+    return replace(made, evaluation=evaluation, rounds=(turn,), began="shipped")
 
 
 def page(

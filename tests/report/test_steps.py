@@ -52,11 +52,16 @@ def test_a_difference_without_pairs_says_so() -> None:
 
 
 @pytest.mark.parametrize(
-    ("shipped", "trained_on", "called"),
-    [(True, False, "base (shipped)"), (True, True, "base (shipped, trained on)"), (False, False, "base")],
+    ("began", "trained_on", "called"),
+    [
+        ("shipped", False, "base (shipped)"),
+        ("shipped", True, "base (shipped, trained on)"),
+        ("own", False, "base (own)"),
+        ("scratch", False, "base"),
+    ],
 )
-def test_what_came_along_is_told_apart_in_every_table(shipped: bool, trained_on: bool, called: str) -> None:
-    results = replace(loop_results([found()], [TRUTH]), pretrained=shipped, base_trained_on=trained_on)
+def test_what_came_along_is_told_apart_in_every_table(began: Any, trained_on: bool, called: str) -> None:
+    results = replace(loop_results([found()], [TRUTH]), began=began, base_trained_on=trained_on)
     tables = told(results)
     rates = tables["success on the stand-in robot"]
     assert called in {row[0] for row in rates} and ("base" in {row[0] for row in rates}) == (called == "base")

@@ -17,7 +17,7 @@ from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.sampling.sampler import ClipSampler
 from tasks import base, experts, refine, report
 from tasks.policies import training
-from tasks.policies.came_along import came_along
+from tasks.policies.came_along import began, came_along, seen_before
 from tasks.sections import Loop, Round
 from tasks.settings import params
 from tests.tracking.clips import waving
@@ -180,6 +180,20 @@ def test_base_goes_on_from_a_policy_that_comes_with_the_code(workspace: Path, in
     card = json.loads(Path("models/base/card.json").read_text())
     assert card["parent"] == parent and came_along(Path("models/base"))
     assert load_policy(Path("models/base")).shape.hidden == load_policy(pretrained.FOLDER).shape.hidden
+
+
+def test_base_goes_on_from_ones_own_policy_and_cards_say_what_it_had_learnt_from(workspace: Path) -> None:
+    """Another's policy under our name: the layers are its own, and the licences of its motions go on."""
+    (new := Path("data/policy")).mkdir()
+    load_policy(pretrained.RANDOMISED).save(new)
+    (new / "card.json").write_text(json.dumps({"licences": {"MIT": 3}, "learnt_before": ["`first`: CC BY 4.0"]}))
+    content = yaml.safe_load(Path("params.yaml").read_text())
+    content["base"] |= {"init": "own", "learner": "none"}
+    Path("params.yaml").write_text(yaml.safe_dump(content))
+    base.main()
+    assert began(Path("models/base")) == "own" and not came_along(Path("models/base"))
+    assert seen_before(Path("models/base")) == ["`first`: CC BY 4.0", "`data/policy`: MIT (3)"]
+    assert load_policy(Path("models/base")).shape == load_policy(pretrained.RANDOMISED).shape
 
 
 def test_a_parent_that_looks_elsewhere_is_bad_input(workspace: Path) -> None:

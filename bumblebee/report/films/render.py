@@ -12,7 +12,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from bumblebee.report.films.looks import dress, meshes_of_user
+from bumblebee.report.films.looks import meshes_of_user
+from bumblebee.report.films.plain_looks import show
 
 BACKENDS = ("egl", "osmesa")
 
@@ -47,7 +48,7 @@ def render_frames(
 
 
 def dressed(xml: str) -> mujoco.MjSpec:
-    """The model with a chequered floor and the G1's visible shape; physics is not touched, only drawn."""
+    """The model with a chequered floor and the robot's visible shape; physics is not touched, only drawn."""
     spec = mujoco.MjSpec.from_string(xml)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960
     spec.visual.headlight.ambient, spec.visual.headlight.diffuse = [0.45] * 3, [0.35] * 3
@@ -65,7 +66,7 @@ def dressed(xml: str) -> mujoco.MjSpec:
     )
     spec.add_material(name="squares", textures=["", "squares"], texrepeat=[2, 2], texuniform=True)
     spec.geom("floor").material = "squares"
-    dress(spec, meshes_of_user())
+    show(spec, meshes_of_user())
     return spec
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bumblebee.report.films.looks import dress, is_g1
+from bumblebee.report.films.plain_looks import show
 
 _ROD = (0.55, 0.58, 0.62)
 _SHOWN = 3  # groups of geoms that MuJoCo's viewer shows at first
@@ -52,8 +52,7 @@ def shape(spec: mujoco.MjSpec, meshes: Path | None = None) -> Shape:
         meshes: folder of the G1's meshes, as `dress` takes it.
     """
     spec = spec.copy()
-    if is_g1(spec):
-        dress(spec, meshes)
+    show(spec, meshes)
     model = spec.compile()
     parts = coarse(surfaces(model))
     return Shape(model, parts, _data(model, parts))

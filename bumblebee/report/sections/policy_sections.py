@@ -12,10 +12,12 @@ NOT_YOURS = (
     "Policies were evaluated in simulation only: on the declared model and on a stand-in robot with made-up effects. "
     "Neither is your robot, on which only the measured rollouts were taken."
 )
-PRETRAINED = (
-    "Training began from the policy that comes along, which real motions on a GPU had taught most of this already; "
-    "motions held out here may be among what it saw (bumblebee/learning/pretrained/README.md)."
-)
+BEGAN = {
+    "shipped": "Training began from the policy that comes along, which real motions on a GPU had taught most of this "
+    "already; motions held out here may be among what it saw (bumblebee/learning/pretrained/README.md).",
+    "own": "Training began from a policy that was brought along; motions held out here may be among what it saw.",
+}
+STARTS = {"scratch": "from scratch", "shipped": "from the policy that comes along", "own": "from your own policy"}
 ENGINES = {"stand_in": "on the stand-in robot", "nominal": "on the declared model"}
 _CLAIMS = (
     "Paired by motion. Better or worse only if the 95 % interval leaves out zero and p is at most 0.05. Success: more "
@@ -34,10 +36,13 @@ def training_section(results: LoopResults) -> Section:
     base = {n: c for n, c in results.curves.items() if n == "base"}
     experts = {n: c for n, c in results.curves.items() if n.startswith("expert")}
     rest = {n: c for n, c in results.curves.items() if n == "generalist"}
-    blocks: list[Block] = [note(PRETRAINED)] if results.pretrained else []
-    start = "from the policy that comes along" if results.pretrained else "from scratch"
+    blocks: list[Block] = [note(BEGAN[results.began])] if results.began in BEGAN else []
+    start = STARTS[results.began]
     groups = {
-        f"Base policy, {start}": (base, "Episodes start anywhere in a clip, with noise and a shrinking threshold."),
+        f"Base policy, {start}": (
+            base,
+            "Episodes start anywhere in a clip, with noise and a shrinking threshold.",
+        ),
         "Experts": (experts, "r0: fine-tuned from the base policy; r1 and later: refined in the corrected simulator."),
         "Generalist": (rest, "By DAgger from the final experts."),
     }

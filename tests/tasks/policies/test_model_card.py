@@ -69,7 +69,8 @@ def test_what_is_not_known_is_said_to_be_so(policy_folder, tmp_path: Path) -> No
 def test_a_card_names_what_the_shipped_weights_have_learnt_from(policy_folder) -> None:  # noqa: F811
     folder = policy_folder()
     for shipped in MOTIONS:
-        card = model_card("base", "base", folder, None, Evaluated("b", "nominal", RESULT), {"MIT": 2}, shipped)
+        known = [f"`{NAMES[shipped]}`: {MOTIONS[shipped]}"]
+        card = model_card("base", "base", folder, None, Evaluated("b", "nominal", RESULT), {"MIT": 2}, known)
         assert f"- its weights have also learnt from `{NAMES[shipped]}`: {MOTIONS[shipped]}" in card and "CC BY" in card
         assert len(card) <= 5000, "MLflow's tables hold no more"
 
