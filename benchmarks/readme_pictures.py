@@ -119,11 +119,11 @@ def film(rollouts: list[Rollout], words: list[str]) -> list[Image.Image]:
     return pictures
 
 
-def save(path: Path, pictures: list[Image.Image]) -> None:
+def save(path: Path, pictures: list[Image.Image], fps: float = _FPS) -> None:
     """Write an animated picture that plays at real speed, over and over, in at most 1.5 MB."""
     frames = np.stack([np.asarray(picture) for picture in pictures])
     for quality in (80, 65, 50, 35):
-        if (size := write_film(path, frames, _FPS, quality)) <= _LARGEST:
+        if (size := write_film(path, frames, fps, quality)) <= _LARGEST:
             break
     print(f"written: {path}, {len(pictures)} frames, {size / 1e6:.2f} MB")
 

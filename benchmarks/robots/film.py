@@ -31,8 +31,8 @@ from bumblebee.report.films.render import render_frames
 from bumblebee.robot.model import build_spec
 from bumblebee.robot.which import VARIABLE
 
-_FPS, _SECONDS = 12.5, 5.0
-_WIDTH, _HEIGHT = 240, 300  # pixels, of a robot
+_FPS, _SECONDS = 10.0, 3.6
+_WIDTH, _HEIGHT = 200, 260  # pixels, of a robot
 
 
 def frames_of(folder: Path, motions: list[str]) -> dict[str, np.ndarray]:
@@ -112,7 +112,7 @@ def main() -> None:
         np.savez(options.out, **frames_of(options.folders[0], options.motions))
         return
     every = [_in_a_process_of_its_own(folder, options.motions) for folder in options.folders]
-    save(options.out, beside(every, [folder.name for folder in options.folders], options.motions))
+    save(options.out, beside(every, [folder.name for folder in options.folders], options.motions), _FPS)
 
 
 if __name__ == "__main__":

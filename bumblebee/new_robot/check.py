@@ -16,7 +16,7 @@ FLAT = 0.01  # m between the highest and the lowest corner of both soles
 UPRIGHT = np.cos(np.deg2rad(10))
 ALIKE = 0.02  # of a range or a limit: what makers' two sides differ by
 KILOGRAMS, HEIGHT = (3.0, 300.0), (0.2, 2.5)  # kg, m of the pelvis
-EFFORT, SPEED, FREQUENCY, DAMPING = (0.5, 2000.0), (0.5, 100.0), (0.5, 40.0), (0.05, 10.0)  # N m, rad/s, Hz, 1
+EFFORT, SPEED, FREQUENCY, DAMPING = (0.5, 2000.0), (0.5, 100.0), (0.5, 40.0), (0.05, np.inf)  # N m, rad/s, Hz, 1
 SAG = 0.5  # rad that a servo may give way under the robot's own weight
 
 

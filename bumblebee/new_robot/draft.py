@@ -1,8 +1,9 @@
 """A first robot.yaml of an MJCF: what geometry and names tell, and what a person must look at.
 
 Legs are the two chains of joints whose ends are lowest, arms the two that end farthest to the sides above the pelvis;
-knees and elbows are found by name, else as the joint farthest from both ends of its limb; a foot's sole is the box of
-its mass and inertia, or the lowest of its shapes. Everything is inferred at the model's zero pose.
+knees and elbows are found by their joints' names, else as the joint that bends farthest from both ends of its limb; a
+hand is the last body that is fixed to an arm; a sole is the lowest of a foot's shapes, else the box of its mass and
+inertia. Everything is inferred at the model's zero pose, but for the stand, which a keyframe of the maker's may tell.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ import numpy as np
 
 from bumblebee import quaternions
 from bumblebee.errors import BadInput
+from bumblebee.new_robot.maker import CORNERS, Maker
 from bumblebee.robot.mjcf import half_lengths
 from bumblebee.robot.shapes import Bodies
 from bumblebee.robot.written import EVERY, SIDES
@@ -21,7 +23,8 @@ _SOLE = 0.01  # m: radius of the spheres at a sole's corners
 _BENT = {"hip": -0.1, "knee": 0.3, "ankle": -0.2}  # rad: a relaxed stand, turns about y
 _GUESS = {"velocity_limit": 20.0}  # rad/s: what most motors of humanoids reach
 _FORWARD = 1.8  # times the centre of mass: the end of a last link, as of an even rod and a bit
-_ACROSS = 0.9  # of an axis along y: a joint that pitches
+_ACROSS = 0.9  # of an axis along y: a joint that pitches; of one along its limb: a joint that twists
+_APART = 0.05  # m between two key bodies of a limb
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Draft:
     asked: tuple[str, ...]
 
 
-def draft(where: object, name: str, model: str, bodies: Bodies) -> Draft:
+def draft(where: object, name: str, model: str, bodies: Bodies, maker: Maker) -> Draft:
     """Infer a robot's file.
 
     Args:
@@ -40,6 +43,7 @@ def draft(where: object, name: str, model: str, bodies: Bodies) -> Draft:
         name: the robot's.
         model: name of the MJCF beside the file.
         bodies: its table (`mjcf.bodies_of`).
+        maker: what else its model says.
 
     Raises:
         BadInput: no two legs or no two arms are found.
@@ -53,30 +57,34 @@ def draft(where: object, name: str, model: str, bodies: Bodies) -> Draft:
     roles: dict[str, Any] = {"pelvis": pelvis}
     for side in SIDES:
         own = _limb(legs[side], torso, pelvis)
-        knee = _middle(own, at, at[own[-1]][0], ("knee",))
+        knee = _middle(bodies, own, at, at[own[-1]][0], "knee")
         roles |= {f"{side}_hip": _before(own, knee), f"{side}_knee": knee, f"{side}_foot": own[-1]}
     roles["torso"] = torso
     for side in SIDES:
         own = _limb(arms[side], torso, pelvis)
-        end = _end_of(bodies, own[-1])
-        elbow = _middle(own, at, at[own[-1]][0] + _turned(at, own[-1], end), ("elbow",))
-        hand: Any = own[-1] if elbow != own[-1] else [own[-1], _numbers(end)]
+        tip = _tip(bodies, own[-1], at)
+        end = _turned(at, own[-1], _end_of(bodies, own[-1])) + at[own[-1]][0] if tip == own[-1] else at[tip][0]
+        elbow = _middle(bodies, own, at, end, "elbow")
+        near = np.linalg.norm(at[elbow][0] - at[tip][0]) < _APART
+        hand: Any = [own[-1], _numbers(_seen(at, own[-1], end))] if near else tip
         roles |= {f"{side}_shoulder": _before(own, elbow), f"{side}_elbow": elbow, f"{side}_hand": hand}
     shoulders = np.mean([at[roles[f"{side}_shoulder"]][0] for side in SIDES], axis=0)
     rise = shoulders[2] - at[roles["left_hip"]][0][2]
+    if torso == pelvis:  # a waist between the trunk and the legs
+        roles["torso"] = [torso, _numbers(_seen(at, torso, (at[torso][0] + shoulders) / 2))]
     said = {
         "robot": name,
         "model": model,
         "held": [],
         "motors": _motors(bodies),
-        "stand": _stand(bodies, roles, at),
+        "stand": _kept(bodies, maker.stand) or _stand(bodies, roles, at),
         "key_bodies": roles,
         "head": [torso, _numbers(_seen(at, torso, shoulders + np.array([0, 0, 0.45 * rise])))],
         "neck": [torso, _numbers(_seen(at, torso, shoulders + np.array([0, 0, 0.1 * rise])))],
         "sole_radius": _SOLE,
-        "soles": {side: _sole(bodies, roles[f"{side}_foot"]) for side in SIDES},
+        "soles": {side: _sole(bodies, roles[f"{side}_foot"], at, maker) for side in SIDES},
     }
-    return Draft(said, tuple(_questions(said)))
+    return Draft(said, tuple(_questions(said, bodies)))
 
 
 def poses_of(bodies: Bodies) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -136,11 +144,29 @@ def _limb(chain: tuple[str, ...], torso: str, pelvis: str) -> tuple[str, ...]:
     return chain[start + 1 :]
 
 
-def _middle(own: Sequence[str], at: Mapping[str, Any], end: np.ndarray, names: Sequence[str]) -> str:
-    """The joint in the middle of a limb: by name, else the one farthest from the limb's start and its end."""
-    named = [body for body in own if any(name in body.lower() for name in names)]
+def _middle(bodies: Bodies, own: Sequence[str], at: Mapping[str, Any], end: np.ndarray, word: str) -> str:
+    """The body of a limb's middle: by its joint's name, else whose joint bends farthest from the limb's both ends."""
+
+    def bends(body: str) -> bool:
+        along, axis = end - at[body][0], _turned(at, body, np.array(bodies[body]["joint"]["axis"]))
+        return abs(float(axis @ along)) < _ACROSS * float(np.linalg.norm(along))
+
+    bent = [body for body in own if bends(body)] or list(own)
+    named = [body for body in bent if word in bodies[body]["joint"]["name"].lower()]
     first = at[own[0]][0]
-    return max(named or own, key=lambda b: min(np.linalg.norm(at[b][0] - first), np.linalg.norm(at[b][0] - end)))
+    return max(named or bent, key=lambda b: min(np.linalg.norm(at[b][0] - first), np.linalg.norm(at[b][0] - end)))
+
+
+def _tip(bodies: Bodies, last: str, at: Mapping[str, Any]) -> str:
+    """The body that ends a limb: of those fixed to its last moving one, the farthest from its joint."""
+    fixed = [body for body in bodies if last in [body, *_above(bodies, body)] and _moved_by(bodies, body) == last]
+    far = max(fixed, key=lambda body: np.linalg.norm(at[body][0] - at[last][0]))
+    return far if np.linalg.norm(at[far][0] - at[last][0]) > _APART else last
+
+
+def _moved_by(bodies: Bodies, body: str) -> str:
+    """The next body up, itself included, that has a joint."""
+    return next((one for one in [body, *_above(bodies, body)] if "joint" in bodies[one]), body)
 
 
 def _before(own: Sequence[str], body: str) -> str:
@@ -174,6 +200,12 @@ def _motors(bodies: Bodies) -> dict[str, dict[str, float | None]]:
     return found
 
 
+def _kept(bodies: Bodies, angles: Mapping[str, float]) -> dict[str, float]:
+    """A keyframe's angles, but for joints that are at 0 in it."""
+    ranges = {facts["joint"]["name"]: facts["joint"]["range"] for facts in bodies.values() if "joint" in facts}
+    return {name: round(float(np.clip(a, *ranges[name])), 4) for name, a in angles.items() if name in ranges and a}
+
+
 def _stand(bodies: Bodies, roles: Mapping[str, Any], at: Mapping[str, Any]) -> dict[str, float]:
     """Bent knees under a level trunk, by the joints of the legs that pitch."""
     found = {}
@@ -193,26 +225,21 @@ def _stand(bodies: Bodies, roles: Mapping[str, Any], at: Mapping[str, Any]) -> d
     return found
 
 
-def _sole(bodies: Bodies, foot: str) -> list[list[float]]:
+def _sole(bodies: Bodies, foot: str, at: Mapping[str, Any], maker: Maker) -> list[list[float]]:
     """Four corners under a foot, as centres of spheres: of its lowest shapes, else of the box of its inertia."""
-    shapes = [shape for shape in bodies[foot].get("collision", [])]
-    ends = np.array([end for shape in shapes for end in ends_of(shape)])
-    radii = np.array([shape["size"][0] for shape in shapes for _ in ends_of(shape)])
-    if len(shapes) < 4:
+    boxes = maker.boxes.get(foot, [])
+    if not boxes:
         half = half_lengths(bodies[foot]["mass"], np.array(bodies[foot]["inertia"]))
         turn = quaternions.normalised(np.array(bodies[foot]["inertia_quat"]))
-        reach = np.abs(np.stack([quaternions.rotate(turn, axis) for axis in np.diag(half)])).max(axis=0)
-        centre = np.array(bodies[foot]["com"])
-        low, high = centre - reach, centre + reach
-    else:
-        bottom = ends[:, 2] - radii
-        touching = ends[bottom < bottom.min() + 0.005]
-        low, high = touching.min(axis=0), touching.max(axis=0)
-        low[2] = bottom.min()
-    z = float(low[2]) + _SOLE
+        boxes = [np.array([quaternions.rotate(turn, c) for c in half * CORNERS]) + bodies[foot]["com"]]
+    placed = [np.array([_turned(at, foot, corner) for corner in box]) for box in boxes]  # a foot's frame may be tilted
+    bottom = min(box[:, 2].min() for box in placed)
+    touching = np.concatenate([box for box in placed if box[:, 2].min() < bottom + _SOLE])
+    low, high = touching.min(axis=0), touching.max(axis=0)
     inset = np.minimum(_SOLE, 0.25 * (high - low))
     xs, ys = (low[0] + inset[0], high[0] - inset[0]), (low[1] + inset[1], high[1] - inset[1])
-    return [_numbers(np.array([x, y, z])) for x in xs for y in ys]
+    back = quaternions.conjugate(at[foot][1])
+    return [_numbers(quaternions.rotate(back, np.array([x, y, bottom + _SOLE]))) for x in xs for y in ys]
 
 
 def ends_of(shape: Mapping[str, Any]) -> list[np.ndarray]:
@@ -224,18 +251,23 @@ def ends_of(shape: Mapping[str, Any]) -> list[np.ndarray]:
     return [centre - reach, centre + reach]
 
 
-def _questions(said: Mapping[str, Any]) -> list[str]:
+def _questions(said: Mapping[str, Any], bodies: Bodies) -> list[str]:
     """Questions to the person who knows the robot, the surest trouble first."""
     lacking = {key for lacks in said["motors"].values() for key, value in lacks.items() if value is None}
     guessed = {key: value for lacks in said["motors"].values() for key, value in lacks.items() if value is not None}
     points = [role for role, value in said["key_bodies"].items() if isinstance(value, list)]
+    driven = [facts["joint"] for facts in bodies.values() if "joint" in facts]
     return [
         *(f"motors: {key}, which the model does not say; without it nothing runs" for key in sorted(lacking)),
         *(f"motors: {key} is a guess of {value:g}" for key, value in guessed.items()),
-        "motors: kp and kd, where the robot's own servos have others than 10 Hz on their rotors",
+        *(
+            ["motors: kp and kd, where the robot's own servos have others than 10 Hz on their rotors"]
+            if any("kp" not in joint for joint in driven)
+            else []
+        ),
         "soles: their corners are guessed from the foot's shapes or inertia; measure them",
         "head, neck: guessed above the shoulders",
-        *([f"key_bodies: {', '.join(points)} guessed at the end of the last link"] if points else []),
+        *([f"key_bodies: {', '.join(points)} guessed, as a point of a link"] if points else []),
         "held: joints that stay still, such as wrists or a neck",
     ]
 

@@ -11,6 +11,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
 from bumblebee.io.write import new_folder, refuse_foreign, refuse_overlap
 from bumblebee.new_robot.draft import draft, ends_of, poses_of
+from bumblebee.new_robot.maker import maker_of
 from bumblebee.robot.mjcf import bodies_of
 from bumblebee.robot.shapes import Bodies
 from bumblebee.robot.which import FILE
@@ -31,7 +32,7 @@ def draft_folder(model: Path, out: Path, overwrite: bool = False) -> tuple[str, 
     refuse_foreign(out, lambda path: (path / FILE).is_file(), "a robot's folder")
     refuse_overlap(out, [model])
     bodies = bodies_of(model)
-    made = draft(model, model.stem[:_NAME], model.name, bodies)
+    made = draft(model, model.stem[:_NAME], model.name, bodies, maker_of(model))
     text = "# A draft: `bumblebee robot check` says what does not hold; docs/your-robot.md explains each key.\n"
     with new_folder(out) as folder:
         (folder / model.name).write_bytes(read_bytes(model))

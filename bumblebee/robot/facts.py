@@ -26,6 +26,8 @@ BODY_OF = {role: body if place is None else role for role, (body, place) in _SAI
 KEY_BODIES = tuple(BODY_OF[role] for role in ROLES)
 """The 14 bodies whose positions are tracked ("keypoints"), in the order of `written.ROLES`."""
 PELVIS, TORSO = BODY_OF["pelvis"], BODY_OF["torso"]
+TRUNK = _SAID.key_bodies["torso"][0]
+"""The body with the torso's mass: the torso itself, or the one that it is a point of."""
 FEET = (BODY_OF["left_foot"], BODY_OF["right_foot"])
 HEAD: tuple[str, Vector] = _SAID.head
 """Body and place in its frame [m]."""

@@ -115,6 +115,10 @@ def _require_known(path: Path, bodies: Bodies, written: Written) -> None:
     root, pelvis = next(iter(bodies)), written.key_bodies["pelvis"][0]
     if pelvis != root:
         raise BadInput(f"{path}: key_bodies.pelvis", f"{root}, the body that floats", pelvis)
+    whole = [body for body, place in written.key_bodies.values() if place is None]
+    if twice := [body for body in whole if whole.count(body) > 1]:
+        do = f"Write one of them as a point of it: [{twice[0]}, [0.0, 0.0, 0.1]]."
+        raise BadInput(f"{path}: key_bodies", "14 places, each named once", f"{twice[0]} twice", do)
 
 
 def stand_names(joint: str) -> tuple[str, ...]:
@@ -155,10 +159,10 @@ def _with_points(bodies: Bodies, written: Written) -> Bodies:
 
 
 def _with_soles(bodies: Bodies, written: Written) -> Bodies:
-    """The table with two capsules along each sole's edges as a foot's shapes, where it has none of its own for that."""
+    """The table with two capsules along each sole's edges as a foot's shapes; one that has its own soles keeps them."""
     for side in SIDES:
         foot = bodies[written.key_bodies[f"{side}_foot"][0]]
-        if not any("_foot" in shape["name"] for shape in foot.get("collision", [])):
+        if not any(shape["name"] == f"{side}_foot1_collision" for shape in foot.get("collision", [])):
             corners = [np.array(corner) for corner in sorted(written.soles[side], key=lambda one: (one[1], one[0]))]
             edges = enumerate((corners[:2], corners[2:]), 1)
             foot["collision"] = [capsule(f"{side}_foot{i}_collision", a, b, written.sole_radius) for i, (a, b) in edges]

@@ -16,7 +16,7 @@ from bumblebee.robot.drives import ON_JOINT, explicit_drives
 from bumblebee.robot.model_size import LARGEST, refuse_multiplied
 from bumblebee.robot.shapes import Bodies, capsule, floats
 
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_MESH, _PLANE = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_PLANE
 _SIMPLE = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
@@ -31,17 +31,16 @@ def bodies_of(path: Path) -> Bodies:
     """The table of a model's one floating tree, parents first.
 
     Args:
-        path: MJCF. Meshes are left out: bodies whose other shapes can touch keep these, as spheres and capsules; the
-            others get a capsule of their mass and inertia.
+        path: MJCF. Meshes are left out: what else can touch stays, as spheres and capsules; a body of which only a mesh
+            can touch gets a capsule of its mass and inertia, and one of which nothing can has no shape.
 
     Raises:
         BadInput: no model that loads without its meshes, or one that the table cannot hold.
     """
-    model = _compiled(path)
-    root = _root(path, model)
-    own = [body for body in range(root, model.nbody) if model.body_rootid[body] == root]
+    model, meshed = compiled(path)
     bodies: Bodies = {}
-    for body in own:
+    root = base_of(path, model)
+    for body in (body for body in range(root, model.nbody) if model.body_rootid[body] == root):
         name = model.body(body).name
         if not name:
             above = model.body(int(model.body_parentid[body])).name
@@ -50,13 +49,20 @@ def bodies_of(path: Path) -> Bodies:
         facts["parent"] = "world" if body == root else model.body(int(model.body_parentid[body])).name
         if body != root and (joint := _joint(path, model, body)):
             facts["joint"] = joint
-        if shapes := _shapes(model, body, name):
+        if shapes := _shapes(model, body, name, name in meshed):
             facts["collision"] = shapes
         bodies[name] = facts
     return bodies
 
 
-def _compiled(path: Path) -> mujoco.MjModel:
+def compiled(path: Path) -> tuple[mujoco.MjModel, set[str]]:
+    """A maker's model of what can touch, without meshes; and the bodies of which a mesh could.
+
+    Where nothing touches by itself or in a `pair`, everything counts as if it could.
+
+    Raises:
+        BadInput: no model in one file that loads without its meshes.
+    """
     text = read_text(path, LARGEST)
     if "\0" in text or "<mujoco" not in text:
         raise BadInput(path, "an MJCF model", "another file")
@@ -65,21 +71,30 @@ def _compiled(path: Path) -> mujoco.MjModel:
     refuse_multiplied(path, text)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        for geom in list(spec.geoms):
-            if int(geom.type) == _MESH:
-                spec.delete(geom)
+        paired = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
+        touching = [g for g in spec.geoms if g.contype | g.conaffinity or g.name in paired]
+        own = [geom for geom in touching if geom.type != _PLANE] or list(spec.geoms)
+        meshed = {geom.parent.name for geom in own if geom.type == _MESH}
+        for part in [*spec.pairs, *(geom for geom in spec.geoms if geom not in own or geom.type == _MESH)]:
+            spec.delete(part)
+        for part in (*spec.geoms, *spec.sites):
+            part.material = ""
         for kind in (spec.meshes, spec.skins, spec.textures, spec.materials, spec.hfields):
             for element in list(kind):
                 spec.delete(element)
-        return explicit_drives(spec)[0].compile()
+        return explicit_drives(spec)[0].compile(), meshed
     except Exception as error:  # ValueError mostly; FatalError from MuJoCo's allocations
         came = " ".join(str(error).split())[:200]
         do = "Masses and inertias must be written in the model (`inertial`), since meshes are not read."
         raise BadInput(path, "an MJCF that loads without its meshes", came, do) from None
 
 
-def _root(path: Path, model: mujoco.MjModel) -> int:
-    """The floating base with the largest tree."""
+def base_of(path: Path, model: mujoco.MjModel) -> int:
+    """The floating base with the largest tree.
+
+    Raises:
+        BadInput: none, or joints that do not move by themselves.
+    """
     free = [int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE]
     if not free:
         raise BadInput(
@@ -151,18 +166,14 @@ def _drive(path: Path, model: mujoco.MjModel, joint: int) -> dict[str, float]:
     return found
 
 
-def _shapes(model: mujoco.MjModel, body: int, name: str) -> list[dict[str, Any]]:
-    geoms = [
-        geom
-        for geom in range(model.ngeom)
-        if model.geom_bodyid[geom] == body and model.geom_contype[geom] | model.geom_conaffinity[geom]
-    ]
+def _shapes(model: mujoco.MjModel, body: int, name: str, meshed: bool) -> list[dict[str, Any]]:
+    geoms = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] == body]
     found = [
         _rounded(f"{name}_{i}_collision", _SIMPLE[kind], model.geom_size[g], model.geom_pos[g], model.geom_quat[g])
         for i, g in enumerate(geoms, 1)
         if (kind := int(model.geom_type[g])) in _SIMPLE
     ]
-    if found or not model.body_mass[body]:
+    if found or not meshed or not model.body_mass[body]:
         return found
     half = half_lengths(model.body_mass[body], model.body_inertia[body])
     return [_rounded(f"{name}_1_collision", "box", half, model.body_ipos[body], model.body_iquat[body])]

@@ -100,7 +100,7 @@ def _key_bodies(where: str, said: Any) -> dict[str, Point]:
     for role in ROLES:
         value = table[role]
         found[role] = (value, None) if isinstance(value, str) else _placed(f"{where}.{role}", value)
-    for role in ("pelvis", "torso", "left_foot", "right_foot"):
+    for role in ("pelvis", "left_foot", "right_foot"):
         if found[role][1] is not None:
             raise BadInput(f"{where}.{role}", "the name of a body", "a point of one")
     return found

@@ -7,13 +7,15 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.new_robot.draft import draft
 from bumblebee.new_robot.first_folder import draft_folder
+from bumblebee.new_robot.maker import maker_of
 from bumblebee.robot.mjcf import bodies_of
 from tests.robot.made_up import mjcf
 
 
 def drafted(tmp_path: Path, text: str):
     (tmp_path / "made.xml").write_text(text)
-    return draft(tmp_path / "made.xml", "made", "made.xml", bodies_of(tmp_path / "made.xml"))
+    path = tmp_path / "made.xml"
+    return draft(path, "made", "made.xml", bodies_of(path), maker_of(path))
 
 
 def test_roles_soles_and_stand_come_from_geometry(tmp_path: Path) -> None:

@@ -57,16 +57,20 @@ def test_motors_are_said_for_every_joint_and_by_joint(tmp_path: Path) -> None:
     assert by_name["l_bend"]["effort_limit"] == 120.0  # as the model's motor says
 
 
-def test_a_box_becomes_the_capsule_along_its_longest_side_and_a_link_without_shapes_one_of_its_inertia(
+def test_a_box_becomes_the_capsule_along_its_longest_side_and_a_link_of_a_mesh_one_of_its_inertia(
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "made.xml").write_text(mjcf())
+    skull, cap = '<body name="skull" pos="0 0 0.48">', '<geom type="mesh" mesh="cap" material="felt"/>'
+    assets = '<asset><mesh name="cap" file="not_here.stl"/><material name="felt"/></asset>'
+    text = mjcf(**{skull: skull + cap, "<worldbody>": assets + "<worldbody>"})
+    (tmp_path / "made.xml").write_text(text.replace('<geom type="sphere"', '<geom material="felt" type="sphere"'))
     bodies = bodies_of(tmp_path / "made.xml")
     (shoe,) = bodies["l_shoe"]["collision"]
     assert shoe["type"] == "capsule"
     assert 2 * (shoe["size"][0] + shoe["size"][1]) == pytest.approx(0.22)
     (skull,) = bodies["skull"]["collision"]
     assert skull["size"][0] == pytest.approx(0.08 * np.sqrt(1.5), rel=1e-3)  # even: the box of three like moments
+    assert "collision" not in bodies["l_joint"]  # whose maker gives it nothing that touches
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ and Euler angles: that of NVIDIA's SOMA retargeter, in which BONES-SEED is publi
 units and the order must be set.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,7 +19,8 @@ from bumblebee.motion.reading.remedy import say
 from bumblebee.robot.facts import joint_names
 
 _QUATERNION, _EULER = 7, 6  # columns of the root
-_COUNTERS = ("frame", "frame_id", "frame_index", "index")
+_TIME = "time"
+_COUNTERS = ("frame", "frame_id", "frame_index", "index", _TIME)
 _SOMA = tuple(f"root_{what}{axis}" for what in ("translate", "rotate") for axis in "xyz")
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 UNITS = say({"csv_length": "cm", "csv_angle": "deg", "csv_euler": "xyz"})
@@ -39,7 +40,7 @@ class CsvLayout:
     """The joints in the order of their columns."""
     width: int
     counter: int | None = None
-    """Column that numbers the frames."""
+    """Column that numbers or times the frames."""
     metres: float = 1.0
     """Length of a unit of the position [m]."""
     degrees: bool = False
@@ -50,6 +51,8 @@ class CsvLayout:
     """Who says the quaternion's order; "": nobody."""
     stated: bool = True
     """Whether units and order are what the file or the user says, not what files of this layout usually have."""
+    seconds: bool = False
+    """Whether the counter holds times."""
 
     @property
     def unit(self) -> str:
@@ -84,6 +87,11 @@ def header_layout(path: Path, cells: list[str], options: RobotConfig) -> CsvLayo
         cells: the names.
         options: units and orders where the names do not say them.
     """
+    timed = cells[0].strip().strip('"').lower() == _TIME
+    return replace(_named_layout(path, cells, options), seconds=timed)
+
+
+def _named_layout(path: Path, cells: list[str], options: RobotConfig) -> CsvLayout:
     names = [cell.strip().strip('"').lower() for cell in cells]
     first = next((column for column, name in enumerate(names) if _joint(name) in joint_names(every=True)), len(names))
     counter = 0 if names[0] in _COUNTERS else None
@@ -129,7 +137,10 @@ def _euler(
 
 
 def _joint(name: str) -> str:
-    return name.removesuffix("_dof").removesuffix("_joint") + "_joint"
+    """The joint that a column is named after, whatever its case, with or without `_joint` and `_dof`; else its name."""
+    stem = name.removesuffix("_dof").removesuffix("_joint")
+    known = {joint.lower(): joint for joint in joint_names(every=True)}
+    return next((known[own] for own in (name, stem, f"{stem}_joint") if own in known), f"{stem}_joint")
 
 
 def _joints(path: Path, cells: list[str], first: int) -> tuple[str, ...]:

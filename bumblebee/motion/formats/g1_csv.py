@@ -43,7 +43,7 @@ def read_g1_csv(path: Path, fps: float, data: bytes | None = None, options: Robo
     first_row = 2 if cells else 1
     values = _numbers(path, lines[first_row - 1 :], first_row, layout.width)
     if layout.counter is not None:
-        _counted(path, values[:, layout.counter], first_row)
+        _counted(path, values[:, layout.counter], first_row, layout.seconds)
     if layout.euler and not layout.stated:
         _units_hold(path, values, layout)
     angle = np.pi / 180 if layout.degrees else 1.0
@@ -76,13 +76,15 @@ def _rotation(values: np.ndarray, layout: CsvLayout) -> np.ndarray:
     return quat
 
 
-def _counted(path: Path, numbers: np.ndarray, first_row: int) -> None:
-    """A file that numbers its frames has all of them."""
-    jumps = np.flatnonzero(np.diff(numbers) != 1)
+def _counted(path: Path, numbers: np.ndarray, first_row: int, seconds: bool) -> None:
+    """A file that numbers or times its frames has all of them."""
+    steps = np.diff(numbers)
+    even = float(np.median(steps)) if seconds and len(steps) else 1.0
+    jumps = np.flatnonzero(np.abs(steps - even) > (0.5 * even if seconds else 0))
     if len(jumps):
         row, before = int(jumps[0]) + 1, numbers[jumps[0]]
-        where = f"{path}, row {row + first_row}, frame number"
-        raise BadInput(where, f"{before + 1:g}, the next", f"{numbers[row]:g}", "Copy or export the file again.")
+        where = f"{path}, row {row + first_row}, {'time' if seconds else 'frame number'}"
+        raise BadInput(where, f"{before + even:g}, the next", f"{numbers[row]:g}", "Copy or export the file again.")
 
 
 def _units_hold(path: Path, values: np.ndarray, layout: CsvLayout) -> None:

@@ -3,7 +3,8 @@
 `fps`, `joint_pos` (T, J) [rad], `body_pos_w` (T, B, 3) [m], `body_quat_w` (T, B, 4) [wxyz]; velocities are not read.
 The root is the pelvis among the bodies, all other kinematics is computed anew: simulators order joints and bodies
 differently (`orders.py`). Without bodies the root is `base_pos_w` (T, 3) [m] and `base_quat_w` (T, 4), as Isaac Lab
-exports it, or it stands before the joints as in MuJoCo's qpos: xyz [m], quaternion wxyz.
+exports it, `root_pos` and `root_quat_wxyz`, as `motions retarget` writes it, or it stands before the joints as in
+MuJoCo's qpos: xyz [m], quaternion wxyz.
 """
 
 from pathlib import Path
@@ -18,8 +19,10 @@ from bumblebee.motion.formats.layouts import arranged, layouts, notes_of, requir
 from bumblebee.motion.formats.orders import BREADTH, DEPTH, body_orders, demand, detect, joint_order
 from bumblebee.motion.rates import RATES, rate_in
 from bumblebee.motion.raw import RawMotion, as_wxyz
+from bumblebee.robot.facts import ROBOT
 
 _ROOT = 7
+_ROOTS = (("base_pos_w", "base_quat_w"), ("root_pos", "root_quat_wxyz"))
 _MOST_BODIES = 200
 _WORDS = {DEPTH: "depth-first as in MuJoCo", BREADTH: "breadth-first as in Isaac", "": "as the file names them"}
 
@@ -45,7 +48,7 @@ def read_mjlab_npz(path: Path, arrays: dict[str, np.ndarray], options: RobotConf
         raise BadInput(f"{path}: fps", f"one number of frames a second ({', '.join(RATES)})", "none", do)
     named = _named(path, arrays, joints.shape[1], options)
     bodies = _bodies(path, arrays, len(joints), ("body_pos_w", "body_quat_w"), "B, ")
-    root = root or _bodies(path, arrays, len(joints), ("base_pos_w", "base_quat_w"))
+    root = root or next(filter(None, (_bodies(path, arrays, len(joints), keys) for keys in _ROOTS)), None)
     if bodies is not None and root is not None and not body_orders(bodies[0].shape[1]):
         bodies = None  # the root is known without them
     order: str = options.quaternion or "wxyz"
@@ -81,10 +84,10 @@ def read_mjlab_npz(path: Path, arrays: dict[str, np.ndarray], options: RobotConf
 
 
 def _joints(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray] | None]:
-    """Joint angles (T, 29 or 23) [rad], and the root (T, 3), (T, 4) where it stands before them."""
+    """Joint angles (T, J) [rad], and the root (T, 3), (T, 4) where it stands before them."""
     values = arrays["joint_pos"]
     where = f"{path}, joint_pos"
-    if values.ndim != 2 or values.shape[1] not in (23, 29, _ROOT + 23, _ROOT + 29) or not len(values):
+    if values.ndim != 2 or not {values.shape[1], values.shape[1] - _ROOT} & {*sizes()} or not len(values):
         known = " or ".join(f"(T, {count})" for count in sizes())
         wanted = f"shape {known} with at least a frame, or 7 columns more with the root first"
         raise BadInput(where, wanted, str(values.shape)[:80])
@@ -102,7 +105,7 @@ def _named(path: Path, arrays: dict[str, np.ndarray], dof: int, options: RobotCo
         said = tuple(name for name in said if "floating" not in name and name != "root")
         require_joints(f"{path}, joint_names", said)
         if len(said) != dof:
-            raise BadInput(f"{path}, joint_names", f"the names of {dof} G1 joints", str(len(said)))
+            raise BadInput(f"{path}, joint_names", f"the names of {dof} joints of {ROBOT}", str(len(said)))
         return {"": said}
     kinds = (options.npz_joints,) if options.npz_joints else (DEPTH, BREADTH)
     known = {name: joints for name, joints in layouts(dof).items() if options.joints_23 in ("", name) or not name}

@@ -1,4 +1,4 @@
-"""A robot without a shape of its own as one sees it: what touches, a bone where a link has nothing, soles and a head.
+"""A robot without a shape of its own as one sees it: what touches, bones from link to link, soles and a head.
 
 What is added has no mass and touches nothing, so that physics stays what it was.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from bumblebee.report.films.looks import VISUAL, dress, is_g1
 from bumblebee.robot.facts import FEET, HEAD, SOLE_RADIUS, SOLES
 
-_BONE, _SHORT = 0.03, 0.02  # m: radius, and the length below which a link needs none
+_BONE, _SHORT = 0.025, 0.02  # m: radius, and the length below which a link needs none
 _HEAD = 0.09  # m
 _LIMB, _DARK = (0.95, 0.76, 0.2, 1.0), (0.25, 0.28, 0.33, 1.0)
 
@@ -39,11 +39,9 @@ def show(spec: mujoco.MjSpec, meshes: Path | None = None, tint: Sequence[float] 
 
 
 def _add_bones(spec: mujoco.MjSpec) -> None:
-    """From a link without a geom to each link that hangs on it."""
+    """From each link to those that hang on it."""
     for body in spec.bodies:
-        if body.name == "world" or list(body.geoms):
-            continue
-        for child in body.bodies:
+        for child in body.bodies if body.name != "world" else ():
             if np.linalg.norm(child.pos) > _SHORT:
                 ends = [0.0, 0.0, 0.0, *child.pos]
                 _add(body, mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=ends, size=[_BONE, 0, 0], rgba=_LIMB)

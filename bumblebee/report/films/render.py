@@ -16,6 +16,7 @@ from bumblebee.report.films.looks import meshes_of_user
 from bumblebee.report.films.plain_looks import show
 
 BACKENDS = ("egl", "osmesa")
+_PELVIS = 0.785  # m, height of the G1's in its stand, which fills the picture
 
 
 def render_frames(
@@ -73,13 +74,14 @@ def dressed(xml: str) -> mujoco.MjSpec:
 def _draw(xml: str, qpos: np.ndarray, width: int, height: int) -> np.ndarray:
     model = dressed(xml).compile()
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
+    tall = model.key_qpos[0, 2] / _PELVIS if model.nkey else 1.0
     frames = np.empty((len(qpos), height, width, 3), dtype=np.uint8)
     with mujoco.Renderer(model, height, width) as renderer:
         for frame, state in zip(frames, qpos, strict=True):
             data.qpos[:] = state
             mujoco.mj_forward(model, data)
-            camera.lookat[:] = (state[0], state[1], 0.68)
-            camera.distance, camera.azimuth, camera.elevation = 2.5, 130, -12
+            camera.lookat[:] = (state[0], state[1], 0.68 * tall)
+            camera.distance, camera.azimuth, camera.elevation = 2.5 * tall, 130, -12
             renderer.update_scene(data, camera)
             frame[:] = renderer.render()
     return frames

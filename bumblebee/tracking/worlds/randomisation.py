@@ -17,11 +17,11 @@ import mujoco
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import TORSO
+from bumblebee.robot.facts import TRUNK
 from bumblebee.sim.engine import Engine
 from bumblebee.tracking.config import Randomisation
 
-BASE = TORSO
+BASE = TRUNK
 """The body whose centre of mass `base_com` shifts."""
 
 

@@ -124,7 +124,7 @@ def test_names_in_the_file_decide(motions):
     for wrong, line in (
         ([*names[:-1], names[1]], f"joint_names: expected each joint once, came {names[1]} in names 2 and 29"),
         ([*names[:-1], "left_tail_joint"], "joint_names, name 29: expected the name of a joint of g1_23dof"),
-        (names[:-1], "joint_names: expected the names of 29 G1 joints, came 28"),
+        (names[:-1], "joint_names: expected the names of 29 joints of g1_23dof, came 28"),
     ):
         with pytest.raises(BadInput, match=line):
             read(motions, {**content, "joint_names": np.array(wrong)})
