@@ -1,8 +1,8 @@
 """Stage seal: draws the stand-in robot's undeclared effects by seed and seals them in data/sealed/robot.json.
 
-A robot on which the shipped policy loses next to nothing has nothing to win back: it is drawn again, a little worse,
-until the policy loses a share of the motions. Only the stand-in's process reads the file, and the report at the very
-end. With a real robot this stage has no use, and nothing is tried.
+A robot on which the policy that the loop begins from loses next to nothing has nothing to win back: it is drawn again,
+a little worse, until the policy loses a share of the motions. Only the stand-in's process reads it, and the report
+at the very end. With a real robot this stage has no use, and nothing is tried.
 """
 
 import json
@@ -16,7 +16,8 @@ import numpy as np
 
 from bumblebee.evaluation.thinning import thin
 from bumblebee.learning import pretrained
-from bumblebee.learning.export import export_shipped
+from bumblebee.learning.export import export_policy
+from bumblebee.learning.policy import FILE, load_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
@@ -53,7 +54,7 @@ class SealConfig(Ranged):
     severity: Annotated[float, Range(above=0, most=100)] = 1.5
     """Factor on the sizes, which are else 0.4 to 1.0 of the largest fault of their kind and never above it."""
     loses: PartOf = 1 / 3
-    """Share of the motions, of those that it follows on the declared model, that the shipped policy must lose."""
+    """Share of the motions, of those that it follows on the declared model, that the policy must lose."""
     stands: Annotated[float, Range(least=0, most=3600)] = 2.0
     """Median time that it must follow a motion all the same [s]: a robot that falls at once gives no data."""
     draws: Count = 20
@@ -104,24 +105,33 @@ def main() -> None:
     """Draw until the robot is worth it, and seal."""
     config = load("seal", SealConfig)
     rehearsed = load("rollouts", RolloutsConfig).source is None
-    tried = config.n_effects and rehearsed and ROBOT == pretrained.THEIRS  # no policy comes along for another robot
-    sealed = found(config, trial_clips(config)) if tried else sealed_robot(config, 0)
+    begun = begun_from()
+    tried = begun is not None and config.n_effects and rehearsed
+    sealed = found(config, trial_clips(config), begun) if begun and tried else sealed_robot(config, 0)
     with output_file(paths.SEALED_ROBOT) as path:
         path.write_text(json.dumps(sealed, indent=1) + "\n")
     print(f"sealed {len(sealed['effects'])} effects, sha256 {sealed['sha256'][:12]}")
     log_run("seal", params=config, metrics=sealed.get("trial", {}), tags={"sealed": sealed["sha256"]})
 
 
-def found(config: SealConfig, motions: Sequence[Clip]) -> dict[str, Any]:
-    """The first robot drawn on which the shipped policy loses enough, and stands long enough to be measured.
+def begun_from() -> Path | None:
+    """Folder of the policy that the loop can begin from: the user's own, or for our G1 the one that comes along."""
+    if (paths.POLICY / FILE).is_file():
+        return paths.POLICY
+    return pretrained.FOLDER if ROBOT == pretrained.THEIRS else None
+
+
+def found(config: SealConfig, motions: Sequence[Clip], begun: Path) -> dict[str, Any]:
+    """The first robot drawn on which the policy in `begun` loses enough, and stands long enough to be measured.
 
     Where there is none among the draws, the one on which it loses most: a line says so, and the loop goes on.
     """
     with tempfile.TemporaryDirectory() as scratch:
-        policy = export_shipped(Path(scratch) / "shipped")
+        policy = Path(scratch)
+        export_policy(policy, load_policy(begun))
         clips = followed(policy, motions, config.trial_seed, config.threads)
         if not clips:
-            print("the shipped policy follows none of the trial's motions on the declared model: no loss to measure")
+            print("the policy follows none of the trial's motions on the declared model: no loss to measure")
             return sealed_robot(config, 0)
         tried: list[tuple[Trial, dict[str, Any]]] = []
         for attempt in range(config.draws):
@@ -129,7 +139,7 @@ def found(config: SealConfig, motions: Sequence[Clip]) -> dict[str, Any]:
             trial = try_robot(policy, sealed, clips, config.trial_seed, config.threads)
             tried.append((trial, sealed | {"trial": {**asdict(trial), "motions": len(clips)}}))
             worth = trial.lost >= config.loses and trial.seconds >= config.stands
-            lost = f"the shipped policy loses {trial.lost:.0%} of {len(clips)} motions, median {trial.seconds:.1f} s"
+            lost = f"the policy loses {trial.lost:.0%} of {len(clips)} motions, median {trial.seconds:.1f} s"
             print(f"draw {attempt + 1}: {lost}{'' if worth else ', not taken'}", flush=True)
             if worth:
                 return tried[-1][1]

@@ -10,8 +10,9 @@ import numpy as np
 
 from bumblebee.api import checks
 from bumblebee.errors import BadInput
+from bumblebee.learning.pretrained import THEIRS
 from bumblebee.motion.clip import Clip
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import ROBOT, joint_names
 
 EMBEDDED = "embedded"
 
@@ -52,6 +53,9 @@ def read_motions(
     from bumblebee.motion.reading.settings import ReadConfig
 
     if str(path) == EMBEDDED:
+        if ROBOT != THEIRS:
+            came = f"those that come along for {THEIRS}, and this is {ROBOT}"
+            raise BadInput("motions", "a folder of motion files", came)
         return make_library(_settings(EmbeddedConfig, settings))
     config = _settings(ReadConfig, {"max_seconds": max_seconds, **settings})
     reading = read_folder(Path(path).expanduser(), config, cache=user_cache())

@@ -183,7 +183,8 @@ def robot(
     slow: Slow = 1.0,
     seconds: Annotated[float | None, typer.Option("--seconds", min=0, help="End after so long; else Ctrl-C.")] = None,
 ) -> None:
-    """Be a robot: a simulated G1 in a gantry, in real time, with IMU, encoders and odometry, until Ctrl-C."""
+    """Be a robot: a simulated one in a gantry, in real time, with IMU, encoders and odometry, until Ctrl-C."""
+    from bumblebee.robot.facts import ROBOT as NAME
     from bumblebee.sim.quiet import quiet_mujoco
     from bumblebee.stand_in.sealed import read_sealed
     from bumblebee.wire.links.line import LineFaults
@@ -197,7 +198,7 @@ def robot(
     effects = read_sealed(sealed) if sealed else []
     require_alone(wire, at)
     harden(ROBOT)
-    print(f"a simulated G1 on the wire {wire}; Ctrl-C ends it", flush=True)
+    print(f"a simulated {NAME} on the wire {wire}; Ctrl-C ends it", flush=True)
     made = run_robot(wire, at, effects, settings, slow, seconds, lambda line: print(line, flush=True))
     refused = dict(made.hearing.refused) or "none"
     print(f"orders refused: {refused}; time lost to a busy machine: {made.slipped / 1e9:.2f} s")

@@ -105,7 +105,7 @@ def convert(
 def retarget(
     path: Where,
     out: Annotated[Path, typer.Option("--out", help="New folder for the motions and LICENCES.csv.")],
-    model: Annotated[Path | None, typer.Option("--model", help="A humanoid's MJCF; without, the G1.")] = None,
+    model: Annotated[Path | None, typer.Option("--model", help="MJCF of another humanoid.")] = None,
     mapping: Annotated[Path | None, typer.Option("--mapping", help="Its mapping: docs/data.md.")] = None,
     to: Annotated[str, typer.Option("--to", help="npz or csv.")] = "npz",
     fps: Annotated[float, typer.Option("--fps", min=5, max=1000, help="Rate of what is written.")] = 50.0,
@@ -117,12 +117,13 @@ def retarget(
     """Put motions of people on any humanoid, one file each with the root's pose and the joints by name."""
     from bumblebee.motion.reading.inspect import count
     from bumblebee.motion.retarget_files import RobotFiles, retarget_files
+    from bumblebee.robot.facts import ROBOT
 
     if to not in ("npz", "csv"):
         raise BadInput("--to", "npz or csv", repr(to)[:60])
     config = RobotFiles(model, mapping, fps, to, _options(csv_fps, settings, skeleton))  # type: ignore[arg-type]
     if model is None and mapping is None:
-        print("Onto the G1; `bumblebee motions convert` writes the formats that its trainers read.")
+        print(f"Onto {ROBOT}; `bumblebee motions convert` writes the formats that its trainers read.")
     began = shown = time.monotonic()
 
     def tell(problem: str, motions: int) -> None:

@@ -87,18 +87,20 @@ def draft(where: object, name: str, model: str, bodies: Bodies, maker: Maker) ->
     return Draft(said, tuple(_questions(said, bodies)))
 
 
-def poses_of(bodies: Bodies) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Place [m] and orientation of each body at the zero pose, from the root."""
+def poses_of(bodies: Bodies, angles: Mapping[str, float] | None = None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Place [m] and orientation of each body from the root, at these joint angles [rad]; what is not named is at 0."""
+    angles = angles or {}
     found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for name, facts in bodies.items():
         if facts["parent"] not in found:
             found[name] = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
             continue
         place, turn = found[facts["parent"]]
-        found[name] = (
-            place + quaternions.rotate(turn, np.array(facts["pos"])),
-            quaternions.multiply(turn, quaternions.normalised(np.array(facts["quat"]))),
-        )
+        own = quaternions.multiply(turn, quaternions.normalised(np.array(facts["quat"])))
+        if joint := facts.get("joint"):
+            bent = quaternions.from_axis_angle(joint["axis"], angles.get(joint["name"], 0.0))
+            own = quaternions.multiply(own, bent)
+        found[name] = place + quaternions.rotate(turn, np.array(facts["pos"])), own
     return found
 
 

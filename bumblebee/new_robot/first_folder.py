@@ -56,8 +56,8 @@ class _Short(yaml.SafeDumper):
 
 
 def picture(bodies: Bodies, said: dict[str, Any]) -> str:
-    """The robot's shapes at its zero pose from four sides as SVG, with the key bodies' roles and the soles."""
-    at = poses_of(bodies)
+    """The robot's shapes in its stand from four sides as SVG, with the key bodies' roles and the soles."""
+    at = poses_of(bodies, said["stand"])
     ends = {
         name: [np.array(e) for s in facts.get("collision", []) for e in ends_of(s)] for name, facts in bodies.items()
     }

@@ -1,4 +1,4 @@
-"""What a maker's MJCF tells beside the table: how far each link's shapes reach, and the pose that it is kept in."""
+"""Shapes and pose that a maker's MJCF tells beside the table: how far each link reaches, and how the robot is kept."""
 
 from dataclasses import dataclass
 from pathlib import Path

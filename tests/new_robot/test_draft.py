@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
@@ -10,6 +11,14 @@ from bumblebee.new_robot.first_folder import draft_folder
 from bumblebee.new_robot.maker import maker_of
 from bumblebee.robot.mjcf import bodies_of
 from tests.robot.made_up import mjcf
+
+_MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.002 0.002 0.002"/>'
+_SPIN = '<actuator><motor joint="spin" ctrlrange="-80 80"/>'
+
+
+def made(tmp_path: Path) -> Path:
+    (tmp_path / "plain.xml").write_text(mjcf())
+    return tmp_path / "plain.xml"
 
 
 def drafted(tmp_path: Path, text: str):
@@ -44,6 +53,67 @@ def test_what_the_model_does_not_tell_is_asked(tmp_path: Path) -> None:
     without = drafted(tmp_path, mjcf(**{'<joint armature="0.02"/>': "<joint/>"}))
     assert without.said["motors"]["every"] == {"velocity_limit": 20.0, "armature": None}
     assert without.asked[0].startswith("motors: armature, which the model does not say")
+
+
+def test_a_keyframe_named_after_a_stand_is_the_stand(tmp_path: Path) -> None:
+    joints = ["l_yaw", "l_roll", "l_pitch", "l_bend", "l_tip", "l_tilt"]
+    qpos = "0 0 0.9 1 0 0 0 " + " ".join("0.5" if name == "l_bend" else "0" for name in joints) + " 0" * 14
+    key = f'<keyframe><key name="home" qpos="{qpos}"/></keyframe></mujoco>'
+    assert drafted(tmp_path, mjcf(**{"</mujoco>": key})).said["stand"] == {"l_bend": 0.5}
+
+
+def test_a_sole_is_the_makers_box_also_in_a_tilted_frame(tmp_path: Path) -> None:
+    shoe = '<geom type="box" size="0.11 0.045 0.015" pos="0.04 0 -0.055"/>'
+    flat = np.array(drafted(tmp_path, mjcf()).said["soles"]["left"])
+    np.testing.assert_allclose(flat.min(axis=0), [-0.06, -0.035, -0.06], atol=1e-3)
+    np.testing.assert_allclose(flat.max(axis=0), [0.14, 0.035, -0.06], atol=1e-3)
+    turn = np.array([[np.cos(0.3), 0, np.sin(0.3)], [0, 1, 0], [-np.sin(0.3), 0, np.cos(0.3)]])
+    place = turn.T @ [0.04, 0, -0.055]
+    level = f'<geom type="box" size="0.11 0.045 0.015" pos="{place[0]} 0 {place[2]}" euler="0 -0.3 0"/>'
+    tilted = mjcf(**{shoe: level, '<body name="l_shoe">': '<body name="l_shoe" euler="0 0.3 0">'})
+    corners = np.array(drafted(tmp_path, tilted).said["soles"]["left"])
+    assert np.ptp(corners[:, 2]) > 0.02
+    np.testing.assert_allclose(corners @ turn.T, flat, atol=1e-3)
+
+
+def test_what_touches_nothing_is_no_sole_and_no_shape_but_where_nothing_touches_at_all(tmp_path: Path) -> None:
+    shoe, shell = (
+        '<geom type="box" size="0.11',
+        '<geom contype="0" conaffinity="0" size="0.3"/><geom type="box" size="0.11',
+    )
+    (tmp_path / "shell.xml").write_text(mjcf(**{shoe: shell}))
+    assert maker_of(tmp_path / "shell.xml").boxes.keys() == maker_of(made(tmp_path)).boxes.keys()
+    assert len(bodies_of(tmp_path / "shell.xml")["l_shoe"]["collision"]) == 1
+    nothing = mjcf(**{"<default>": '<default><geom contype="0" conaffinity="0"/>'})
+    (tmp_path / "nothing.xml").write_text(nothing)
+    assert bodies_of(tmp_path / "nothing.xml") == bodies_of(made(tmp_path))
+
+
+def test_an_elbow_bends_and_a_hand_is_what_is_fixed_to_the_arm(tmp_path: Path) -> None:
+    curl = '<geom type="capsule" size="0.035" fromto="0 0 0 0 0 -0.22"/>'
+    twist = f"""{curl}<body name="wrist" pos="0 0 -0.11"><joint name="elbow_twist" axis="0 0 1" range="-1 1"/>
+<inertial pos="0 0 -0.05" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/><body name="palm" pos="0 0 -0.15"/></body>"""
+    text, parts = mjcf(), []
+    for number, part in enumerate(text.split(curl)):
+        side = "lr"[number] if number < 2 else ""
+        own = twist.replace('"wrist"', f'"{side}_wrist"').replace('"palm"', f'"{side}_palm"')
+        parts += [part, own.replace("elbow_twist", f"{side}_elbow_twist") if number < 2 else ""]
+    motors = "".join(f'<motor joint="{side}_elbow_twist" ctrlrange="-9 9"/>' for side in "lr")
+    roles = drafted(tmp_path, "".join(parts).replace("</actuator>", f"{motors}</actuator>")).said["key_bodies"]
+    assert (roles["left_elbow"], roles["left_hand"]) == ("l_lower", "l_palm")
+
+
+def test_a_waist_below_the_floating_body_makes_the_torso_a_point_of_it(tmp_path: Path) -> None:
+    text = mjcf(
+        **{'<joint name="spin" axis="0 0 1" range="-1.5 1.5"/>': "", '<motor joint="spin" ctrlrange="-80 80"/>': ""}
+    )
+    said = drafted(tmp_path, text).said
+    assert said["key_bodies"]["torso"] == "chest"
+    legs = text[text.index('<body name="l_rotor"') : text.index('<body name="chest"')]
+    below = f'<body name="waist"><joint name="spin" axis="0 0 1" range="-1 1"/>{_MASS}{legs}</body>'
+    said = drafted(tmp_path, text.replace(legs, below).replace("<actuator>", _SPIN)).said
+    body, place = said["key_bodies"]["torso"]
+    assert (body, said["key_bodies"]["pelvis"]) == ("hips", "hips") and place[2] > 0.1
 
 
 def test_a_robot_without_a_second_leg_is_refused(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from bumblebee.errors import BadInput
+from bumblebee.learning import pretrained
 from bumblebee.report.truth import match
 from bumblebee.robot.facts import joint_names
 from bumblebee.sim.effects import CATALOGUE as EFFECTS
@@ -78,12 +79,13 @@ def test_half_of_the_joints_are_in_the_legs_the_others_in_waist_and_arms() -> No
 
 @pytest.fixture
 def trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
-    """A workspace in which the shipped policy's trials end as this list says, one draw after the other."""
+    """A workspace in which the policy's trials end as this list says, one draw after the other."""
     monkeypatch.chdir(tmp_path)
     Path("params.yaml").write_text("seal: {seed: 4, draws: 3}\nrollouts: {}\n")
     monkeypatch.setattr(seal, "log_run", lambda *_, **__: None)
     outcomes: list[Trial] = []
-    monkeypatch.setattr(seal, "export_shipped", lambda folder: folder)
+    monkeypatch.setattr(seal, "load_policy", lambda folder: print(f"policy of {folder}"))
+    monkeypatch.setattr(seal, "export_policy", lambda folder, policy: None)
     monkeypatch.setattr(seal, "trial_clips", lambda config: ["clip"])
     monkeypatch.setattr(seal, "followed", lambda policy, clips, *_: clips)
     monkeypatch.setattr(seal, "try_robot", lambda *_: outcomes.pop(0))
@@ -101,6 +103,18 @@ def test_a_robot_is_drawn_again_until_the_policy_loses_a_third_and_yet_can_be_me
     said = capsys.readouterr().out
     assert said.count("not taken") == 2
     assert not any(effect["effect"] in said for effect in sealed["effects"])  # the seal stays closed
+
+
+def test_the_policy_that_was_brought_along_is_the_one_that_is_tried(
+    trials: list[Trial], capsys: pytest.CaptureFixture[str]
+) -> None:
+    trials += [Trial(0.5, 3.0)] * 2
+    seal.main()
+    assert f"policy of {pretrained.FOLDER}\n" in capsys.readouterr().out
+    paths.POLICY.mkdir(parents=True)
+    (paths.POLICY / "policy.pt").touch()
+    seal.main()
+    assert "policy of data/policy\n" in capsys.readouterr().out
 
 
 def test_where_no_draw_will_do_the_one_that_loses_most_and_stands_is_sealed_and_a_line_says_so(

@@ -68,7 +68,7 @@ def test_without_a_robot_a_simulated_one_can_be_started_as_the_line_says(
     words = said.strip().split("bumblebee ")[-1].split()
     assert words == ["deploy", "robot"] and not (tmp_path / "out").exists()
     assert run(*words, "--seconds", "0.1", "--at", tmp_path / "w") == 0
-    assert "a simulated G1 on the wire sim" in capsys.readouterr().out
+    assert "a simulated g1_23dof on the wire sim" in capsys.readouterr().out
 
 
 def test_a_run_that_a_rule_ended_says_so_by_its_status(

@@ -90,7 +90,7 @@ def test_a_csv_has_a_header_and_the_same_numbers(people, tmp_path):
 
 def test_without_a_model_it_is_the_g1_and_convert_is_named(people, tmp_path, capsys):
     assert run(people / "a", "--out", tmp_path / "out") == 0
-    assert "Onto the G1; `bumblebee motions convert`" in capsys.readouterr().out
+    assert "Onto g1_23dof; `bumblebee motions convert`" in capsys.readouterr().out
     with np.load(tmp_path / "out/sway.npz") as held:
         assert tuple(held["joint_names"]) == joint_names()
 
