@@ -77,10 +77,8 @@ def test_a_sole_is_the_makers_box_also_in_a_tilted_frame(tmp_path: Path) -> None
 
 
 def test_what_touches_nothing_is_no_sole_and_no_shape_but_where_nothing_touches_at_all(tmp_path: Path) -> None:
-    shoe, shell = (
-        '<geom type="box" size="0.11',
-        '<geom contype="0" conaffinity="0" size="0.3"/><geom type="box" size="0.11',
-    )
+    shoe = '<geom type="box" size="0.11'
+    shell = f'<geom contype="0" conaffinity="0" size="0.3"/>{shoe}'
     (tmp_path / "shell.xml").write_text(mjcf(**{shoe: shell}))
     assert maker_of(tmp_path / "shell.xml").boxes.keys() == maker_of(made(tmp_path)).boxes.keys()
     assert len(bodies_of(tmp_path / "shell.xml")["l_shoe"]["collision"]) == 1
@@ -104,11 +102,8 @@ def test_an_elbow_bends_and_a_hand_is_what_is_fixed_to_the_arm(tmp_path: Path) -
 
 
 def test_a_waist_below_the_floating_body_makes_the_torso_a_point_of_it(tmp_path: Path) -> None:
-    text = mjcf(
-        **{'<joint name="spin" axis="0 0 1" range="-1.5 1.5"/>': "", '<motor joint="spin" ctrlrange="-80 80"/>': ""}
-    )
-    said = drafted(tmp_path, text).said
-    assert said["key_bodies"]["torso"] == "chest"
+    spin, motor = '<joint name="spin" axis="0 0 1" range="-1.5 1.5"/>', '<motor joint="spin" ctrlrange="-80 80"/>'
+    text = mjcf(**{spin: "", motor: ""})
     legs = text[text.index('<body name="l_rotor"') : text.index('<body name="chest"')]
     below = f'<body name="waist"><joint name="spin" axis="0 0 1" range="-1 1"/>{_MASS}{legs}</body>'
     said = drafted(tmp_path, text.replace(legs, below).replace("<actuator>", _SPIN)).said
