@@ -11,6 +11,8 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from itertools import chain, islice
 from typing import TypeVar
 
+from threadpoolctl import threadpool_limits
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 _FEW = 8  # items: for fewer, processes take longer to start than they save
@@ -30,7 +32,10 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], processes: i
     first = list(islice(items, _FEW))
     processes = processes or cores()
     if processes < 2 or len(first) < _FEW:
-        yield from map(work, chain(first, items))
+        with threadpool_limits(
+            1, user_api="blas"
+        ):  # small matrices: on a busy machine several threads wait for each other
+            yield from map(work, chain(first, items))
         return
     # Spawned, not forked: the parent may have threads.
     context = multiprocessing.get_context("spawn")
