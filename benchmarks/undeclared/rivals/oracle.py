@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from benchmarks.undeclared.rivals.common import Answer, error_of
+from bumblebee.effects.kind import Kind
 from bumblebee.sim.effects import CATALOGUE, Effect
 from bumblebee.stand_in.undeclared.declared import Declared
 from bumblebee.stand_in.undeclared.kinds import KINDS
@@ -20,7 +21,7 @@ def run(robot: Declared, truth: Sequence[dict[str, Any]]) -> Answer | None:
         where = ("floor",) if name in ("ground_friction", "ground_compliance") else tuple(entry["where"])
         effects.append(Effect(name, where, {n: entry["parameters"][n] for n in _names(kind)}))
         if name in _COULOMB:
-            level = _COULOMB[name] * abs(entry["parameters"][kind.parameter])
+            level = _COULOMB[name] * abs(entry["parameters"][_names(kind)[0]])
             effects.append(Effect("coulomb_friction", where, {"frictionloss": level}))
     return Answer([{"effect": e.effect, "where": list(e.where)} for e in effects], error_of(effects))
 
@@ -29,5 +30,5 @@ def run(robot: Declared, truth: Sequence[dict[str, Any]]) -> Answer | None:
 _COULOMB = {"stribeck_friction": 0.4 / 0.6, "asymmetric_friction": 0.625 / 0.75}
 
 
-def _names(kind: Any) -> tuple[str, ...]:
-    return tuple(getattr(kind, "names", None) or (kind.parameter,))
+def _names(kind: Kind) -> tuple[str, ...]:
+    return tuple(parameter.name for parameter in kind.parameters)

@@ -90,4 +90,4 @@ def places(kind: Kind, robot: Declared) -> tuple[str, ...]:
         return robot.joints
     if kind.on == "body":
         return tuple(b for b in robot.bodies if robot.mass[b] >= 0.25)
-    return ("pelvis",) if kind.name == "imu_offset" else ("",)
+    return robot.bodies[:1] if kind.on == "base" and robot.floating else ("",)
