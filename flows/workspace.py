@@ -70,6 +70,7 @@ def create(
         content = merge(content, {"motions": {"source": str(source)}})
         content = merge({"rollouts": {"base": FIELD_BASE}}, content)  # unless the settings say otherwise
     if policy is not None:
+        policy = policy.expanduser()
         if not (policy / POLICY[0]).is_file():
             raise BadInput(policy, f"a policy of `bumblebee train` ({POLICY[0]})", "none", "Check POLICY.")
         content = merge(content, {"base": {"init": "own", "learner": "none"}})
