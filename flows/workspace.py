@@ -69,10 +69,8 @@ def create(
             raise BadInput(source, "a folder of motion files", "no such folder", "Check MOTIONS.")
         content = merge(content, {"motions": {"source": str(source)}})
         content = merge({"rollouts": {"base": FIELD_BASE}}, content)  # unless the settings say otherwise
-    if policy is not None:
-        policy = policy.expanduser()
-        if not (policy / POLICY[0]).is_file():
-            raise BadInput(policy, f"a policy of `bumblebee train` ({POLICY[0]})", "none", "Check POLICY.")
+    brought = _policy_files(policy) if policy is not None else {}
+    if brought:
         content = merge(content, {"base": {"init": "own", "learner": "none"}})
     content = merge(content, over)
     folder.mkdir(parents=True, exist_ok=True)
@@ -91,9 +89,8 @@ def create(
     for place in (paths.INCOMING, paths.RAW, paths.POLICY):
         (folder / place).mkdir(parents=True, exist_ok=True)
         _write(folder / place / "README.md", (HOME / place / "README.md").read_text())
-    if policy is not None:
-        found = [HOME / paths.POLICY / "README.md", *(policy / name for name in POLICY if (policy / name).is_file())]
-        _fill(folder / paths.POLICY, {file.name: file.read_bytes() for file in found})
+    if brought:
+        _fill(folder / paths.POLICY, brought)
     if not (folder / ".dvc" / "config").exists():
         init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
         subprocess.run(init, cwd=folder, env=environment(folder), check=True)
@@ -101,6 +98,19 @@ def create(
         _write(folder / ".dvc" / "config", settings.replace("[core]\n", "[core]\n    no_scm = True\n"))
     private_index(folder)
     return folder
+
+
+def _policy_files(policy: Path) -> dict[str, bytes]:
+    """Content of a workspace's data/policy by name.
+
+    Raises:
+        BadInput: no policy in the folder.
+    """
+    policy = policy.expanduser()
+    if not (policy / POLICY[0]).is_file():
+        raise BadInput(policy, f"a policy of `bumblebee train` ({POLICY[0]})", "none", "Check POLICY.")
+    found = [HOME / paths.POLICY / "README.md", *(policy / name for name in POLICY if (policy / name).is_file())]
+    return {file.name: file.read_bytes() for file in found}
 
 
 def _write_robot(place: Path, robot: str) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from bumblebee.evaluation.thinning import thin
 from bumblebee.learning import pretrained
 from bumblebee.learning.export import export_policy
-from bumblebee.learning.policy import FILE, load_policy
+from bumblebee.learning.policy import load_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
@@ -30,6 +30,7 @@ from tasks.on_robot.seal_trial import Trial, followed, try_robot
 from tasks.on_robot.stand_in import cut
 from tasks.running import paths
 from tasks.running.stage import load, log_run, output_file, run_stage
+from tasks.settings import params
 from tasks.settings.rollouts_config import RolloutsConfig
 
 WORSE = 1.1  # sizes of a draw over those of the draw before
@@ -115,8 +116,8 @@ def main() -> None:
 
 
 def begun_from() -> Path | None:
-    """Folder of the policy that the loop can begin from: the user's own, or for our G1 the one that comes along."""
-    if (paths.POLICY / FILE).is_file():
+    """Folder of the policy to try: the user's own where the loop begins from it, else our G1's that comes along."""
+    if (params.read().get("base") or {}).get("init") == "own":
         return paths.POLICY
     return pretrained.FOLDER if ROBOT == pretrained.THEIRS else None
 

@@ -20,13 +20,14 @@ from benchmarks.method.places import BASE
 from benchmarks.motion_pack import read_pack
 from benchmarks.readme_pictures import HOME, run, save
 from bumblebee.errors import BadInput
+from bumblebee.last_line import guarded
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import load_policy
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.pieces import motion_of
 from bumblebee.policy.exported import ExportedPolicy
-from bumblebee.report.films.filmstrip import states
+from bumblebee.report.films.filmstrip import pale, states
 from bumblebee.report.films.render import render_frames
 from bumblebee.robot.model import build_spec
 from bumblebee.robot.which import VARIABLE
@@ -64,7 +65,7 @@ def _drawn(rollout: Rollout, clip: Clip) -> np.ndarray:
     if frames is None:
         raise RuntimeError(f"nothing can be rendered here: {how}")
     ended = rows >= rollout.frames
-    frames[ended] = (0.45 * frames[ended] + 0.55 * 255).astype(np.uint8)
+    frames[ended] = pale(frames[ended])
     return frames
 
 
@@ -86,34 +87,31 @@ def beside(every: list[dict[str, np.ndarray]], names: list[str], motions: list[s
 def _in_a_process_of_its_own(folder: Path, motions: list[str]) -> dict[str, np.ndarray]:
     with tempfile.TemporaryDirectory() as scratch:
         out = Path(scratch) / "frames.npz"
-        command = [
-            sys.executable,
-            "-m",
-            "benchmarks.robots.film",
-            str(folder),
-            "--motions",
-            *motions,
-            "--out",
-            str(out),
-        ]
-        subprocess.run(command, check=True, env=os.environ | {VARIABLE: folder.name})
+        words = [sys.executable, "-m", "benchmarks.robots.film", str(folder), "--out", str(out), "--motions", *motions]
+        if status := subprocess.run(words, env=os.environ | {VARIABLE: folder.name}).returncode:
+            raise SystemExit(status)  # it has said why
         with np.load(out) as found:
             return dict(found)
 
 
-def main() -> None:
+def main() -> int:
     """Write the film; to an .npz, the frames of one robot."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--motions", nargs="+", required=True)
     parser.add_argument("--out", type=Path, default=HOME / "robots.webp")
     options = parser.parse_args()
-    if options.out.suffix == ".npz":
-        np.savez(options.out, **frames_of(options.folders[0], options.motions))
+    return guarded(lambda: write(options.folders, options.motions, options.out))
+
+
+def write(folders: list[Path], motions: list[str], out: Path) -> None:
+    """Write the film of the robots, or the frames of the first to an .npz."""
+    if out.suffix == ".npz":
+        np.savez(out, **frames_of(folders[0], motions))
         return
-    every = [_in_a_process_of_its_own(folder, options.motions) for folder in options.folders]
-    save(options.out, beside(every, [folder.name for folder in options.folders], options.motions), _FPS)
+    every = [_in_a_process_of_its_own(folder, motions) for folder in folders]
+    save(out, beside(every, [folder.name for folder in folders], motions), _FPS)
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

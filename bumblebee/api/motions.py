@@ -55,7 +55,7 @@ def read_motions(
     if str(path) == EMBEDDED:
         if ROBOT != THEIRS:
             came = f"those that come along for {THEIRS}, and this is {ROBOT}"
-            raise BadInput("motions", "a folder of motion files", came)
+            raise BadInput("motions", "a folder of motion files", came, "Name one of BVH or SMPL files.")
         return make_library(_settings(EmbeddedConfig, settings))
     config = _settings(ReadConfig, {"max_seconds": max_seconds, **settings})
     reading = read_folder(Path(path).expanduser(), config, cache=user_cache())

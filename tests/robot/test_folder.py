@@ -1,5 +1,8 @@
 """A robot's folder becomes one table, whatever it is written as; what does not fit is one line."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ from bumblebee.errors import BadInput
 from bumblebee.new_robot.first_folder import draft_folder
 from bumblebee.robot.folder import read_folder
 from bumblebee.robot.mjcf import bodies_of
-from bumblebee.robot.which import path_of, shipped
+from bumblebee.robot.which import VARIABLE, path_of, shipped
 from tests.robot.made_up import mjcf
 
 
@@ -107,6 +110,7 @@ def test_a_file_that_does_not_fit_is_one_line(tmp_path: Path, changed: dict, lin
     [
         ("pelvis: hips", "pelvis: chest", r"key_bodies\.pelvis: expected hips, the body that floats, came chest"),
         ("left_knee: l_shin", "left_knee: shin", r"key_bodies\.left_knee: expected a body of the model.*, came shin"),
+        ("torso: chest", "torso: hips", r"14 places, each named once, came hips twice\. Write one .*\[hips, \[0\.0"),
     ],
 )
 def test_a_role_that_the_model_cannot_play(tmp_path: Path, old: str, new: str, line: str) -> None:
@@ -179,3 +183,9 @@ def test_meshes_need_not_be_there_but_masses_must(tmp_path: Path) -> None:
 def test_no_such_robot() -> None:
     with pytest.raises(BadInput, match=r"robot nobody: expected a folder with a robot\.yaml, or one of g1_23"):
         path_of("nobody")
+
+
+def test_motions_that_come_along_are_for_our_g1_alone() -> None:
+    command = [sys.executable, "-c", "import bumblebee as bb; bb.read_motions()"]
+    came = subprocess.run(command, env=os.environ | {VARIABLE: "h1"}, capture_output=True, text=True, timeout=120)
+    assert "expected a folder of motion files, came those that come along for g1_23dof, and this is h1" in came.stderr

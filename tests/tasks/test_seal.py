@@ -111,8 +111,7 @@ def test_the_policy_that_was_brought_along_is_the_one_that_is_tried(
     trials += [Trial(0.5, 3.0)] * 2
     seal.main()
     assert f"policy of {pretrained.FOLDER}\n" in capsys.readouterr().out
-    paths.POLICY.mkdir(parents=True)
-    (paths.POLICY / "policy.pt").touch()
+    Path("params.yaml").write_text(Path("params.yaml").read_text() + "base: {init: own}\n")
     seal.main()
     assert "policy of data/policy\n" in capsys.readouterr().out
 

@@ -102,13 +102,14 @@ def film_pair(
         return Film((*stills[0], *stills[1]), None, f"This machine cannot render off-screen ({why}).")
     halves = np.split(frames, 2)
     for half, rollout in zip(halves, (before, after), strict=True):
-        half[rows >= rollout.frames] = _pale(half[rows >= rollout.frames])
+        half[rows >= rollout.frames] = pale(half[rows >= rollout.frames])
     gap = np.full((len(rows), halves[0].shape[1], _GAP, 3), 255, np.uint8)
     both = np.concatenate([halves[0], gap, halves[1]], axis=2)
     return Film((), sheet(both, before.control_hz / step), f"Rendered with {why}.")
 
 
-def _pale(frames: np.ndarray) -> np.ndarray:
+def pale(frames: np.ndarray) -> np.ndarray:
+    """Frames (..., 3) uint8 of a robot that has fallen."""
     return (0.45 * frames + 0.55 * 255).astype(np.uint8)
 
 

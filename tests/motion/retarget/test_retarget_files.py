@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from bumblebee import cli
+from bumblebee.errors import BadInput
+from bumblebee.motion.formats.read import RobotConfig
+from bumblebee.motion.formats.read import read_robot as read_again
 from bumblebee.motion.formats.write import write_motion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.retarget.mapping import read_robot
@@ -93,6 +96,24 @@ def test_without_a_model_it_is_the_g1_and_convert_is_named(people, tmp_path, cap
     assert "Onto g1_23dof; `bumblebee motions convert`" in capsys.readouterr().out
     with np.load(tmp_path / "out/sway.npz") as held:
         assert tuple(held["joint_names"]) == joint_names()
+
+
+@pytest.mark.parametrize("to", ["npz", "csv"])
+def test_what_it_writes_is_read_again(people, tmp_path, to):
+    out = tmp_path / "out"
+    assert run(people / "a", "--out", out, "--to", to) == 0
+    data = (out / f"sway.{to}").read_bytes()
+    (motion,) = read_again(out / f"sway.{to}", data, RobotConfig(csv_fps=50.0))
+    assert motion.fps == 50.0
+    if to == "npz":
+        with np.load(out / "sway.npz") as held:
+            np.testing.assert_array_equal(motion.joint_pos, held["joint_pos"])
+            np.testing.assert_array_equal(motion.root_quat, held["root_quat_wxyz"])
+        return
+    rows = data.decode().splitlines(keepends=True)
+    gap = "".join(rows[:5] + rows[8:]).encode()
+    with pytest.raises(BadInput, match=r"row 6, time: expected 0\.08, the next, came 0\.14"):
+        read_again(out / "sway.csv", gap, RobotConfig(csv_fps=50.0))
 
 
 def test_results_are_replaced_only_when_asked_for_and_never_somebody_elses(people, tmp_path, capsys):
