@@ -5,6 +5,8 @@
     python -m benchmarks.study.robots run/base --motions motions --out robots
     python -m benchmarks.method run --motions motions --robots robots --out run --gpus 2 --minutes 9
     python -m benchmarks.method table run --motions motions --robots robots --out method.md
+    python -m benchmarks.method run --settings ppo --motions motions --out ppo --gpus 2 --minutes 9
+    python -m benchmarks.method beside run ppo --motions motions --out learners.md
 
 From a base policy an expert of each cluster is trained. On each robot, twice: the experts record motions of their own
 clusters; the declared model is corrected by a delta action of each cluster (as in the paper), by the diagnosis, or by

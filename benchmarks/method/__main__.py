@@ -9,7 +9,7 @@ import torch
 import benchmarks.method
 from benchmarks.method.on_robot import recorded_motions
 from benchmarks.method.plan import DONE, Plan
-from benchmarks.method.settings import NAMED, Method
+from benchmarks.method.settings import NAMED, Method, chosen
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.settings import freeze
 from benchmarks.study.steps import Places, Runner, Step
@@ -23,7 +23,7 @@ LATER = "the call is over: the same command goes on"
 
 def run(options: argparse.Namespace) -> None:
     """Do all steps, or as many as the time goes."""
-    method, motions = NAMED[options.settings], read_motions(options.motions)
+    method, motions = chosen(options.settings, options.seed), read_motions(options.motions)
     gpus = options.gpus if method.env.engine == "mujoco_warp" else 0
     steps = begun(options, method, motions)
     wanted = [step for step in steps if options.only is None or step.name.split()[0] in options.only]
@@ -55,7 +55,16 @@ def begun(options: argparse.Namespace, method: Method, motions: Motions) -> list
     stamps = sealed_robots(options.robots)
     if stamps:
         freeze(options.out / "robots", method, robots=stamps)
-    shared = ["--settings", options.settings, "--motions", str(options.motions), "--out", str(options.out)]
+    shared = [
+        "--settings",
+        options.settings,
+        "--seed",
+        str(options.seed),
+        "--motions",
+        str(options.motions),
+        "--out",
+        str(options.out),
+    ]
     shared += ["--robots", str(options.robots)] if options.robots else []
     return Plan(options.out, motions.clusters, sorted(stamps), method, tuple(shared)).steps
 
@@ -78,7 +87,7 @@ def write_table(options: argparse.Namespace) -> None:
     from benchmarks.method.tables import figures, method_tables
 
     out = below_here(options.out) if options.record else options.out
-    method, motions = NAMED[options.settings], read_motions(options.motions)
+    method, motions = chosen(options.settings, options.seed), read_motions(options.motions)
     stamp = freeze(options.run, method, settings=options.settings, motions=motions.hash)
     text = method_tables(options.run, method, motions, options.robots)
     write_file(out, f"<!-- method {stamp}, motions {motions.hash} -->\n\n{text}")
@@ -86,6 +95,16 @@ def write_table(options: argparse.Namespace) -> None:
     if options.record:
         run_id = record(options.run, out, method, stamp, figures(options.run, method, motions))
         print(f"run {run_id} in the registry of {Path.cwd()}", flush=True)
+
+
+def write_beside(options: argparse.Namespace) -> None:
+    """Write the tables of several runs beside each other."""
+    from benchmarks.method.beside import beside
+
+    motions = read_motions(options.motions)
+    text = beside(options.runs, motions)
+    write_file(options.out, f"<!-- motions {motions.hash} -->\n\n{text}")
+    print(text, end="")
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -109,10 +128,16 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     table.add_argument("--out", type=Path, required=True, help="Markdown file")
     table.add_argument("--record", action="store_true", help="write them into the registry too, with all hashes")
     table.set_defaults(work=write_table)
+    runs = commands.add_parser("beside", help="base policy and experts of several runs, by learner and seed")
+    runs.add_argument("runs", type=Path, nargs="+")
+    runs.add_argument("--out", type=Path, required=True, help="Markdown file")
+    runs.add_argument("--motions", type=Path, required=True, help="folder of `benchmarks.study prepare`")
+    runs.set_defaults(work=write_beside)
     for part in (own, table):
         part.add_argument("--motions", type=Path, required=True, help="folder of `benchmarks.study prepare`")
         part.add_argument("--robots", type=Path, help="folder of `benchmarks.study.robots`")
         part.add_argument("--settings", choices=NAMED, default="world_model", help="learner and budgets")
+        part.add_argument("--seed", type=int, default=0, help="of all trainings; a run of its own each")
     return parser.parse_args(arguments)
 
 

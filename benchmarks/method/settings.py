@@ -120,6 +120,11 @@ SMALL = Method(
 NAMED = {"world_model": Method(), "ppo": BY_PPO, "small": SMALL}
 
 
+def chosen(name: str, seed: int) -> Method:
+    """The settings of that name, with a seed."""
+    return replace(NAMED[name], seed=seed)
+
+
 def iterations(config: Config, count: int) -> Config:
     """The learner's settings with so many iterations."""
     assert isinstance(config, PpoConfig | WorldModelConfig)

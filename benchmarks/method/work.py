@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.method.on_robot import OnRobot
 from benchmarks.method.plan import DONE
-from benchmarks.method.settings import NAMED
+from benchmarks.method.settings import NAMED, chosen
 from benchmarks.method.training import Training
 from benchmarks.method.trying import Trying
 from benchmarks.study.motions import read_motions
@@ -19,7 +19,8 @@ from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 
 def do(options: argparse.Namespace) -> bool:
     """Do the step; whether it is done."""
-    method, motions, where = NAMED[options.settings], read_motions(options.motions), options.where
+    method, motions = chosen(options.settings, options.seed), read_motions(options.motions)
+    where = options.where
     if options.kind in ("train", "distil"):
         training = Training(method, motions, options.out, deadline(options.seconds))
         if options.kind == "train":
@@ -42,6 +43,7 @@ def main() -> None:
     parser.add_argument("kind", choices=DONE)
     parser.add_argument("where", help="folder below --out")
     parser.add_argument("--settings", choices=NAMED, required=True)
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--motions", type=Path, required=True)
     parser.add_argument("--robots", type=Path)
     parser.add_argument("--robot")

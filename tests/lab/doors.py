@@ -23,7 +23,7 @@ from flows import runs
 from flows.environment import SERVERS
 from flows.people import accounts as people
 from flows.servers import servers
-from tests.flows.servers.test_pages import LIMIT, Served, make
+from tests.flows.servers.served import LIMIT, Served, make
 from tests.lab import machines
 
 DOCS = Path(__file__).parents[2] / "docs" / "lab.md"

@@ -19,7 +19,7 @@ from bumblebee.measured import gate, gate_record
 from flows.environment import SERVERS
 from flows.people import login
 from flows.servers.servers import HOME, Addresses
-from tests.flows.servers.test_pages import LIMIT, Served
+from tests.flows.servers.served import LIMIT, Served
 from tests.lab import machines
 from tests.lab.conftest import LabOnThisMachine
 from tests.lab.doors import serving, with_gate

@@ -15,7 +15,7 @@ from flows.environment import SERVERS
 from flows.people import accounts as people
 from tasks.lab.checks import check_lab
 from tasks.lab.servers import Lab, MlflowLab, PrefectLab
-from tests.flows.servers.test_pages import CHROMIUM, asks_not_yet
+from tests.flows.servers.served import CHROMIUM, asks_not_yet
 from tests.lab import doors
 from tests.lab.conftest import LabOnThisMachine
 from tests.lab.doors import Doors, first_answer

@@ -1,9 +1,7 @@
-"""A corpus of bad logs: each is one clear line from `import`, or quarantine from the intake, and never a traceback."""
+"""A corpus of bad logs, column maps and models: each is one clear line from `import`, and never a traceback."""
 
 import io
-import json
 import zipfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,29 +11,20 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bumblebee.diagnosis.dataset.session import open_session
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
 from bumblebee.measured.importers import import_dataset
 from bumblebee.measured.importers.asap_npz import import_asap
-from bumblebee.measured.intake import UNFORESEEN, intake
-from bumblebee.measured.metadata import METADATA_KEY
-from bumblebee.measured.rollout import BadRollout, read_rollout, write_rollout
+from bumblebee.measured.rollout import read_rollout
 from bumblebee.measured.tables import read_parquet
-from tests.measured.simulated import ARM, ARM_JOINTS, arm_model, arm_rollout, g1_model, g1_rollout
+from tests.measured.arm_file import model_file
+from tests.measured.simulated import g1_model, g1_rollout
 from tests.measured.test_importers import asap_file
 
 T = np.arange(30) * 0.02
 Q = np.stack([np.sin(T), np.cos(T), T], axis=1)
 MAP = "joints: [a, b]\ncolumns: {joint_pos: [q1, q2], joint_target: [u1, u2]}\n"
 CSV = "time,q1,q2,u1,u2\n" + "".join(f"{t},{t},{t},{t},{t}\n" for t in T)
-
-
-def model_file(folder: Path) -> Path:
-    lines = "".join(f'<position name="{name}" joint="{name}" kp="40" kv="2"/>' for name in ARM_JOINTS)
-    path = folder / "arm.xml"
-    path.write_text(ARM.replace("ACTUATORS", lines))
-    return path
 
 
 def refused(folder: Path, source: Path, kind: str, **more: Path) -> str:
@@ -270,78 +259,3 @@ def test_episodes_that_name_places_elsewhere_or_nothing_stay_inside_and_none_is_
     assert len({name.casefold() for name in ids}) == len(keys)
     assert {path.name for path in tmp_path.iterdir()} == {"home"}
     assert sum(read_rollout(home / "set/out/rollouts" / f"{name}.parquet").frames for name in ids) == len(table)
-
-
-@pytest.mark.parametrize("name", ["../../x", "/x", "a/b", ".x", "", "a\0b", "\ud800", "x" * 300])
-def test_a_rollout_under_a_name_that_leads_elsewhere_is_not_written(tmp_path: Path, name: str) -> None:
-    with pytest.raises(BadRollout, match="rollout-id"):
-        write_rollout(tmp_path / "in" / "a.parquet", replace(arm_rollout(0), rollout_id=name))
-    assert not list(tmp_path.iterdir())
-
-
-def put(column: str, value: float) -> Callable[[Path], None]:
-    def change(path: Path) -> None:
-        rollout = arm_rollout(0, seconds=2.0)
-        values = getattr(rollout, column).copy()
-        values[5:8] = value
-        write_rollout(path, replace(rollout, rollout_id=path.stem, **{column: values}))
-
-    return change
-
-
-def told(**meta: object) -> Callable[[Path], None]:
-    """A file whose metadata say something else."""
-
-    def change(path: Path) -> None:
-        write_rollout(path, replace(arm_rollout(0, seconds=2.0), rollout_id=path.stem))
-        table = pq.read_table(path)
-        said = json.loads(table.schema.metadata[METADATA_KEY]) | meta
-        pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(said).encode()}), path)
-
-    return change
-
-
-def raw(data: bytes) -> Callable[[Path], None]:
-    return lambda path: path.write_bytes(data) and None
-
-
-ROLLOUTS = {
-    "1e200 in positions": put("joint_pos", 1e200),
-    "1e200 in velocities": put("joint_vel", -1e200),
-    "1e200 in targets": put("joint_target", 1e200),
-    "1e200 in time": put("time", 1e200),
-    "targets of 1e8": put("joint_target", 1e8),
-    "targets of 1e5": put("joint_target", 1e5),
-    "1e300 everywhere": put("joint_pos", 1e300),
-    "tiny": put("time", 5e-324),
-    "nan": put("joint_pos", np.nan),
-    "a rate of text": told(control_hz="fast"),
-    "a huge rate": told(control_hz=1e300),
-    "huge gains": told(kp=[10**400] * 3),
-    "infinite gains": told(kp=[float("inf")] * 3),
-    "joints of numbers": told(joints=[1, 2, 3]),
-    "joints with NUL": told(joints=["shoulder\0", "elbow", "wrist"]),
-    "half a surrogate": told(motion="\ud800"),
-    "a name elsewhere": told(rollout_id="../../x"),
-    "deep": told(notes=json.loads("[" * 500 + "]" * 500)),
-    "no Parquet": raw(b"PAR1 PAR1"),
-    "nothing": raw(b""),
-    "a folder": lambda path: path.mkdir(),
-    "a link to nothing": lambda path: path.symlink_to("none"),
-}
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", ROLLOUTS)
-def test_a_bad_rollout_is_set_aside_the_batch_goes_on_and_a_session_says_one_line(tmp_path: Path, name: str) -> None:
-    folder = tmp_path / "in" / "rollouts"
-    write_rollout(folder / "good.parquet", replace(arm_rollout(1, seconds=2.0), rollout_id="good"))
-    ROLLOUTS[name](folder / "bad.parquet")
-    batch = intake(tmp_path / "in", tmp_path / "good", tmp_path / "aside", arm_model())
-    assert (batch.accepted, batch.quarantined) == (["good.parquet"], ["bad.parquet"])
-    assert UNFORESEEN not in set(batch.findings.rule)
-    assert (tmp_path / "aside" / "bad.parquet.findings.json").is_file()
-    (folder / "good.parquet").unlink()
-    with pytest.raises(BadInput) as caught:
-        open_session(model_file(tmp_path), tmp_path / "in")
-    assert "\n" not in str(caught.value)

@@ -171,7 +171,8 @@ def test_every_step_runs_and_is_made_into_tables(folder: Path, monkeypatch: pyte
     steps = command.begun(command.parse(arguments), method, motions)
     for step in steps:
         kind, where, *rest = step.command[1:]
-        own = argparse.Namespace(kind=kind, where=where, settings="small", motions=folder, robots=robots, out=out)
+        given = {"settings": "small", "seed": 0, "motions": folder, "robots": robots, "out": out}
+        own = argparse.Namespace(kind=kind, where=where, **given)
         shard, robot = ("--shard" in rest, "--robot" in rest)
         own.shard, own.seconds = 0 if not shard else int(rest[rest.index("--shard") + 1]), None
         own.robot = rest[rest.index("--robot") + 1] if robot else None

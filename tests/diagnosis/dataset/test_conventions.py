@@ -13,7 +13,7 @@ from bumblebee.diagnosis.quick import first_look, told
 from bumblebee.diagnosis.thresholds.dataset import Conventions, DatasetThresholds
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout, write_rollout
-from tests.commands.test_cli_diagnosis import run
+from tests.commands.conftest import run
 from tests.diagnosis import arm
 from tests.diagnosis.test_catalogue import CONFIG
 

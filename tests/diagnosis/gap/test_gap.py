@@ -16,7 +16,7 @@ from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.gap import GapPage, GapThresholds
 from bumblebee.diagnosis.thresholds.report import ExampleWindows, ReportThresholds, Verdicts
 from bumblebee.measured.rollout import write_rollout
-from tests.commands.test_cli_diagnosis import run
+from tests.commands.conftest import run
 from tests.diagnosis import arm, cart
 from tests.diagnosis.arm import SMALL, session_of
 

@@ -10,7 +10,7 @@ import pytest
 
 from bumblebee.measured.checks import Finding, check_rollout
 from bumblebee.measured.rollout import Rollout
-from tests.commands.test_cli_diagnosis import run
+from tests.commands.conftest import run
 from tests.measured.simulated import ARM, ARM_JOINTS, arm_model, arm_rollout
 
 MAP = """joints: [shoulder, elbow, wrist]

@@ -11,7 +11,7 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.importers import import_dataset
 from bumblebee.measured.model_file import copy_model
 from bumblebee.measured.rollout import read_dataset
-from tests.commands.test_cli_diagnosis import run
+from tests.commands.conftest import run
 from tests.measured.simulated import ARM, ARM_JOINTS, excitation
 
 SERVOS = ARM.replace(

@@ -11,7 +11,7 @@ from bumblebee.measured.checks import check_rollout
 from bumblebee.measured.importers import read_rollouts
 from bumblebee.measured.importers.map_file import read_map
 from bumblebee.measured.rollout import Rollout
-from tests.commands.test_cli_diagnosis import run
+from tests.commands.conftest import run
 from tests.measured.importers.remedies.walk import HINGES, model_of, table
 
 MAP = """
