@@ -14,6 +14,7 @@ from bumblebee.errors import BadInput
 Name = Annotated[str, typer.Option("--name", help="Workspace under runs/; without, the checkout itself.")]
 PrefectPort = Annotated[int, typer.Option("--prefect-port", help="Port of Prefect's server; 0: a free one.")]
 Workspace = Annotated[Path | None, typer.Option("--workspace", help="An existing workspace, as it is.")]
+Approved = Annotated[bool, typer.Option("--approved", help="Only what people approved where asked; says who did.")]
 MlflowPort = Annotated[int, typer.Option("--mlflow-port", help="Port of MLflow's server; 0: a free one.")]
 
 
@@ -90,11 +91,13 @@ def fetch(
     out: Annotated[Path, typer.Option("--out", help="A new folder for the policy.")],
     workspace: Annotated[Path, typer.Option("--workspace", help="Folder with .servers; by default this one.")] = Path(),
     server: Annotated[str, typer.Option("--server", help="MLflow's address, in place of a workspace.")] = "",
+    approved: Approved = False,
 ) -> None:
     """Copy a registered policy with its card and lineage; no server needs to run."""
     from tasks.policies.fetch import main
 
     options = ["--out", str(out), "--workspace", str(workspace), *(["--server", server] if server else [])]
+    options += ["--approved"] if approved else []
     raise typer.Exit(main([model, *options]))
 
 

@@ -7,11 +7,11 @@ import re
 import shlex
 from pathlib import Path
 
-from bumblebee.measured.gate_words import program
 from flows.environment import SERVERS
 from flows.people import login
 from flows.servers import servers
 from flows.servers.first_look import MODELS
+from tasks.approvals.words import program
 from tasks.running import paths
 
 

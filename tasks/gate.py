@@ -4,8 +4,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from bumblebee.measured import gate
-from bumblebee.measured import gate_words as words
+from tasks.approvals import gate, words
 from tasks.running import paths
 from tasks.running.stage import log_run, run_stage
 from tasks.settings.params import load

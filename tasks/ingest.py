@@ -9,16 +9,16 @@ from typing import Annotated, Any
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import file_hash, read_json
-from bumblebee.measured import gate, gate_words
 from bumblebee.measured.checks import Thresholds
 from bumblebee.measured.intake import IntakeSummary, incoming_files, intake, merge
 from bumblebee.measured.model_file import copy_model, load_model
-from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import copy_of_cluster, read_rollout
 from bumblebee.measured.summary import summary_table
 from bumblebee.progress import progress
 from bumblebee.ranges import Line, Name, Range, Ranged
 from bumblebee.robot.model import write_xml
+from tasks.approvals import gate, words
+from tasks.pages.overview import write_overview
 from tasks.running import paths
 from tasks.running.stage import load, log_run, output_folder, run_stage
 
@@ -182,9 +182,9 @@ def ask(round: int) -> None:
     own = load("gate", gate.GateConfig)
     table = gate.settle(place, own.mode == "auto", own.people)
     if table["status"] in gate.WAITS:
-        print(gate_words.how_to_answer(place.workspace, table), flush=True)
+        print(words.how_to_answer(place.workspace, table), flush=True)
     else:
-        print(f"round {round}: {gate_words.said(table)}", flush=True)
+        print(f"round {round}: {words.said(table)}", flush=True)
 
 
 def _accepted(batch: IntakeSummary, out: Path) -> Iterator[Any]:

@@ -11,14 +11,14 @@ import pandas as pd
 
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import compare
-from bumblebee.measured import gate, gate_words
 from bumblebee.policy.exported import ExportedPolicy
 from bumblebee.ranges import Ranged
 from tasks import registry
+from tasks.approvals import gate, words
+from tasks.approvals.promotion.gate import Promotion, PromotionConfig, settle
+from tasks.approvals.promotion.rule import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
 from tasks.policies.came_along import seen_before
 from tasks.policies.model_card import Evaluated, licences_of, model_card
-from tasks.promotion.gate import Promotion, PromotionConfig, settle
-from tasks.promotion.rule import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
 from tasks.running import paths
 from tasks.running.lineage import path_hash
 from tasks.running.stage import load, log_run, output_file, run_stage
@@ -112,7 +112,7 @@ def ask(place: Promotion, people: int) -> None:
     table = gate.request(place, False, people)
     settle(place, table)
     waits = table["status"] in gate.WAITS
-    print(gate_words.how_to_answer(place.workspace, table) if waits else f"{place.model}: {gate_words.said(table)}")
+    print(words.how_to_answer(place.workspace, table) if waits else f"{place.model}: {words.said(table)}")
 
 
 def candidates(shape: Loop) -> Iterator[Candidate]:

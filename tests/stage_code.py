@@ -40,7 +40,7 @@ NO_RESULT = {
     "tasks/sections.py": "the same",
     "tasks/running/parent.py": "ends with the process that started it",
     "tasks/running/recorder.py": "what MLflow is told",
-    "bumblebee/measured/gate_record.py": "a copy of what was answered, which no stage reads",
+    "tasks/approvals/ledger.py": "a copy of what was answered, which no stage reads",
     "tasks/registry/": "what MLflow is told",
     "tasks/running/outputs.py": "what MLflow is told",
     "tasks/lab/": "where that is kept, and who may look at it",
@@ -54,10 +54,12 @@ _CONTRACT = "of an exported policy it reads the contract and the hash, of which 
 _DRAWN = ("example_windows", "gain_by_horizon", "headline", "html", "left_table", "page", "svg", "terminal")
 NO_RESULT_OF = {
     "ingest": {
-        **{f"bumblebee/measured/{name}.py": _PAGE for name in ("gate_words", "overview", "overview_plots")},
+        "tasks/approvals/words.py": _PAGE,
+        "tasks/pages/overview.py": _PAGE,
+        "bumblebee/measured/overview_plots.py": _PAGE,
         **{
-            f"bumblebee/measured/{name}.py": "who answers, and how; the request is not its result"
-            for name in ("gate_people", "gate_table")
+            f"tasks/approvals/{name}.py": "who answers, and how; the request is not its result"
+            for name in ("people", "table")
         },
     },
     "diagnose": {

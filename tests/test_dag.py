@@ -73,8 +73,9 @@ def test_a_new_style_sheet_of_a_page_makes_nothing_stale_but_the_report():
         assert (HOME / page).is_file(), page
         return {name for name, stage in described().items() if covered(page, stage["deps"])}
 
-    for page in ("diagnosis/report/html.py", "diagnosis/report/page.py", "measured/overview.py"):
-        assert stale(f"bumblebee/{page}") == set()
+    for page in ("html.py", "page.py"):
+        assert stale(f"bumblebee/diagnosis/report/{page}") == set()
+    assert stale("tasks/pages/overview.py") == {"report"}
     assert stale("bumblebee/report/page.py") == {"report"}
 
 

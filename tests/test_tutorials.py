@@ -12,8 +12,8 @@ import pytest
 import typer
 
 from bumblebee import cli
-from bumblebee.measured import gate
 from flows.gates import gate_answer
+from tasks.approvals import gate
 from tests.flows.gates.test_gate_answer import waiting
 from tests.motion.human.people import bvh
 

@@ -10,12 +10,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from bumblebee.measured import gate
-from bumblebee.measured import gate_words as words
 from flows import runs
 from flows.environment import SERVERS, environment
 from flows.people import login
 from flows.servers import servers
+from tasks.approvals import gate, words
 from tasks.gate import asked, rule
 
 

@@ -27,11 +27,10 @@ def list_gates(workspace: Workspace = Path()) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from bumblebee.measured import gate, gate_record
-    from bumblebee.measured import gate_words as words
+    from tasks.approvals import gate, ledger, words
+    from tasks.approvals.promotion import answer as promotion_answer
+    from tasks.approvals.promotion.gate import questions
     from tasks.gate import asked
-    from tasks.promotion import answer as promotion_answer
-    from tasks.promotion.gate import questions
 
     folder = folder_of(workspace)
     grid = Table("what", "hash", "what came", "answer")
@@ -45,16 +44,16 @@ def list_gates(workspace: Workspace = Path()) -> None:
         grid.add_row(place.model, words.short(table), escape(words.what(table)), escape(words.said(table)))
     Console().print(grid if grid.row_count else "no round has come in")
     record = folder / "data" / "approvals"
-    so_far = "" if gate_record.end_known(record) else ", as far as they go: none was given here yet"
-    print(f"answers in the record: {len(gate_record.check(record))}, unchanged since{so_far}")
+    so_far = "" if ledger.end_known(record) else ", as far as they go: none was given here yet"
+    print(f"answers in the record: {len(ledger.check(record))}, unchanged since{so_far}")
 
 
 @app.command()
 def show(what: What, workspace: Workspace = Path()) -> None:
     """Print what came in a round, or what a version can; where its plots are, and the commands that answer."""
-    from bumblebee.measured import gate
     from tasks import gate as rounds
-    from tasks.promotion import answer as promotion_answer
+    from tasks.approvals import gate
+    from tasks.approvals.promotion import answer as promotion_answer
 
     place = _place(what, workspace)
     if isinstance(place, gate.Gate):
@@ -107,9 +106,9 @@ def more(
 
 
 def _answer(verb: str, what: str, seen: str, by: str, note: str, change: bool, workspace: Path) -> None:
-    from bumblebee.measured import gate
     from flows.gates.gate_answer import given
-    from tasks.promotion import answer as promotion_answer
+    from tasks.approvals import gate
+    from tasks.approvals.promotion import answer as promotion_answer
 
     who = gate.unix_user(by)
     author = who if by else gate.Author(str(who.known_by["user"]), who.known_by)
@@ -121,8 +120,8 @@ def _answer(verb: str, what: str, seen: str, by: str, note: str, change: bool, w
 def _place(what: str, workspace: Path) -> Any:
     """A round's gate, or a model's promotion."""
     from bumblebee.errors import BadInput
-    from bumblebee.measured import gate
-    from tasks.promotion.gate import Promotion
+    from tasks.approvals import gate
+    from tasks.approvals.promotion.gate import Promotion
 
     folder = folder_of(workspace)
     if re.fullmatch(r"[1-9][0-9]{0,8}", what):

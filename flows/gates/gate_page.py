@@ -13,9 +13,9 @@ from typing import Any
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_json, read_text
-from bumblebee.measured import gate, overview_plots
-from bumblebee.measured import gate_words as words
+from bumblebee.measured import overview_plots
 from bumblebee.measured.rollout import read_rollout, rollout_files
+from tasks.approvals import gate, words
 
 BUTTON = "Resume at the top right (in the menu ⋮ where it is no button)"
 ROWS, PLOTS, BAR = 40, 12, 20  # rows of a table, pictures on the page, blocks of the longest bar

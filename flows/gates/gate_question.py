@@ -10,10 +10,9 @@ from prefect.input import RunInput, read_flow_run_input
 from pydantic import Field, create_model
 
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate
-from bumblebee.measured import gate_words as words
 from flows.gates import gate_page
 from flows.stages import Stage
+from tasks.approvals import gate, words
 from tasks.gate import asked, rule
 from tasks.lab.serve import read_serve
 

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate
-from bumblebee.measured import gate_words as words
-from bumblebee.measured.gate_people import login_of
 from flows.people.accounts import Person
 from flows.people.guard import App, Message, Receive
+from tasks.approvals import gate, words
+from tasks.approvals.people import login_of
 from tasks.gate import asked, rule
 
 QUESTION = re.compile(r"gate-([1-9][0-9]{0,8})-([0-9a-f]{12})-[0-9]+")  # `gate_question.pause_key`

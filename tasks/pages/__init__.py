@@ -1,1 +1,1 @@
-"""Films and replays of the report."""
+"""Pages for people: the intake's, and films and replays of the report."""

@@ -10,12 +10,14 @@ The folder then holds policy.onnx, contract.json, card.json, README.md (the mode
 import argparse
 import os
 import re
+import shutil
 import sys
 from pathlib import Path
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from tasks import registry
+from tasks.approvals.promotion.approved import let_through
 from tasks.lab.serve import require_server
 
 
@@ -33,8 +35,21 @@ def _fetch(options: argparse.Namespace) -> int:
     server = require_server(options.server, "--server") if options.server else ""
     out = options.out.absolute()
     os.chdir(options.workspace)  # the store is the workspace's
-    print(registry.fetch(named[1], named[2] or named[3], out, server))
+    if options.approved and server:
+        raise BadInput("--approved", "a workspace, where answers of people lie", "--server", "Give --workspace.")
+    copied = registry.fetch(named[1], named[2] or named[3], out, server)
+    told = [approved_by(named[1], out)] if options.approved else []
+    print(copied, *told, sep="\n")
     return 0
+
+
+def approved_by(name: str, folder: Path) -> str:
+    """Who approved a policy that was copied, by this workspace's answers; without an approval the copy goes again."""
+    try:
+        return let_through(name, folder / "policy.onnx", Path.cwd())
+    except BadInput:
+        shutil.rmtree(folder)
+        raise
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:
@@ -43,6 +58,9 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     made.add_argument("--out", type=Path, required=True, help="a new folder for the policy")
     made.add_argument("--workspace", type=Path, default=Path("."), help="folder with .servers (default: this one)")
     made.add_argument("--server", default="", help="address of MLflow's server, instead of a workspace's store")
+    made.add_argument(
+        "--approved", action="store_true", help="only what people approved where they were asked; says who"
+    )
     return made.parse_args(argv)
 
 

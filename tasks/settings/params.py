@@ -25,7 +25,7 @@ SECTIONS = {
     "experts": "tasks.experts:ExpertsConfig",
     "rollouts": "tasks.settings.rollouts_config:RolloutsConfig",
     "ingest": "tasks.ingest:IngestConfig",
-    "gate": "bumblebee.measured.gate:GateConfig",
+    "gate": "tasks.approvals.gate:GateConfig",
     "diagnose": "tasks.diagnose:DiagnoseConfig",
     "compensate": "tasks.compensate:CompensateConfig",
     "delta": "bumblebee.learning.delta:DeltaConfig",

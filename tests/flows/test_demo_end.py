@@ -10,10 +10,10 @@ import pytest
 import typer
 
 from bumblebee import cli
-from bumblebee.measured.gate_words import program
 from flows import ending
 from flows.servers import servers
 from flows.servers.servers import Addresses
+from tasks.approvals.words import program
 from tasks.running import paths
 
 FINDING = "3 effects were not in its model; 2 found. Followed: 58\u00a0% before & 89\u00a0% refined."

@@ -6,7 +6,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import read_effects, read_term
-from tests.fuzz.effects_corpus import EFFECTS_FILES, TERMS
+from tests.fuzz.corpora.effects_corpus import EFFECTS_FILES, TERMS
 
 
 @pytest.mark.parametrize("name", EFFECTS_FILES)

@@ -10,8 +10,8 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.motion.reading.folder import ReadConfig, read_folder
 from bumblebee.motion.store import read_library
-from tests.fuzz.library_corpus import LIBRARIES
-from tests.fuzz.motion_corpus import CAPTIONS, FILES
+from tests.fuzz.corpora.library_corpus import LIBRARIES
+from tests.fuzz.corpora.motion_corpus import CAPTIONS, FILES
 from tests.fuzz.motion_files import csv, library, table
 
 CONFIG = ReadConfig(csv_fps=30, joints_23="asap")

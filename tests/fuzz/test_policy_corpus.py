@@ -6,8 +6,8 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.policy.exported import ExportedPolicy
+from tests.fuzz.corpora.policy_corpus import POLICIES, stated
 from tests.fuzz.motion_files import policy
-from tests.fuzz.policy_corpus import POLICIES, stated
 
 
 def test_the_good_one_is_loaded(tmp_path: Path) -> None:

@@ -15,10 +15,10 @@ from typing import Any
 import psutil
 import pytest
 
-from bumblebee.measured import gate, gate_record
 from flows.environment import SERVERS
 from flows.people import login
 from flows.servers.servers import HOME, Addresses
+from tasks.approvals import gate, ledger
 from tests.flows.servers.served import LIMIT, Served
 from tests.lab import machines
 from tests.lab.conftest import LabOnThisMachine
@@ -65,7 +65,7 @@ def again(what: Callable[[], Any]) -> Any:
 
 def done_once(folder: Path) -> bool:
     """Whether the stage behind the gate is made, by one answer in the record."""
-    answers = gate_record.check(folder / "data" / "approvals")
+    answers = ledger.check(folder / "data" / "approvals")
     return (folder / "g.txt").exists() and [one["answer"]["by"] for one in answers] == ["Ada"]
 
 

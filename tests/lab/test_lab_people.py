@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from bumblebee.measured import gate
 from flows.environment import SERVERS
 from flows.people import accounts as people
+from tasks.approvals import gate
 from tasks.lab.checks import check_lab
 from tasks.lab.servers import Lab, MlflowLab, PrefectLab
 from tests.flows.servers.served import CHROMIUM, asks_not_yet

@@ -10,9 +10,9 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.io.read import file_hash
 from bumblebee.measured.intake import IntakeSummary, findings_table, intake, merge
-from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import Rollout, read_rollout, write_rollout
 from bumblebee.measured.summary import summary_table
+from tasks.pages.overview import write_overview
 from tests.measured.simulated import arm_model, arm_rollout
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from bumblebee import cli
 from bumblebee.errors import BadInput
-from bumblebee.measured.gate_words import program
 from tasks import gate as gate_task
 from tasks import ingest
+from tasks.approvals.words import program
 from tests.tasks.rounds import Setup, two_clusters
 
 workspace = pytest.fixture(two_clusters)

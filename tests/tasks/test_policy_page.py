@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,25 @@ def test_what_cannot_be_fetched_is_refused_in_one_line_and_nothing_is_written(
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
     assert sorted(path.name for path in workspace.iterdir()) == before and not (workspace / "data/.servers").exists()
+
+
+def test_what_people_were_asked_about_and_have_not_approved_is_not_copied(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(workspace)
+    asked = ["expert-c0@champion", "--approved", "--out", "asked"]
+    assert fetch.main(asked) == 0 and "no person was asked about it" in capsys.readouterr().out
+    shutil.rmtree("asked")
+    question = Path("data/approvals/promotion-expert-c0.json")
+    question.parent.mkdir()
+    question.write_text("{}")
+    assert fetch.main(asked) == EXIT_BAD_INPUT
+    said = capsys.readouterr()
+    assert "an approval by people of this file, came no answer" in said.err and said.out == ""
+    assert not Path("asked").exists()
+    shutil.rmtree(question.parent)
+    assert fetch.main([*asked, "--server", "http://127.0.0.1:5000"]) == EXIT_BAD_INPUT
+    assert "--approved: expected a workspace" in capsys.readouterr().err
 
 
 def test_a_champion_is_deployed_by_its_name_as_far_as_the_robot(

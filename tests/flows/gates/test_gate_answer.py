@@ -10,10 +10,9 @@ import pytest
 
 from bumblebee import cli
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate
-from bumblebee.measured import gate_words as words
 from flows.gates import gate_answer as gate_flow
 from flows.workspace import HOME
+from tasks.approvals import gate, words
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate
 from flows.gates import gate_answer
 from flows.gates.gate_cli import app
+from tasks.approvals import gate
 from tests.flows.gates.test_gate_answer import waiting
 
 

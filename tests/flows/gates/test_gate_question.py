@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from prefect.states import Cancelled
 
-from bumblebee.measured import gate
 from bumblebee.measured.rollout import Rollout, write_rollout
 from flows.gates import gate_page, gate_question
 from flows.loop import WAITING, outcome
 from flows.stages import Stage
+from tasks.approvals import gate
 
 STAGE = Stage("gate@1", "python -m tasks.gate --round 1", frozenset(), frozenset())
 EVIL = "wave|<script>alert(1)</script> [click](http://evil.example)"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee.measured import gate
 from flows.gates.page_answer import answer
 from flows.people.accounts import Person
+from tasks.approvals import gate
 from tests.flows.gates.test_gate_answer import waiting
 
 ANN, BOB = Person("ann", ("leads",), "", ""), Person("bob", (), "", "")

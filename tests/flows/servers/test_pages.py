@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from bumblebee.measured import gate
 from flows.loop import WAITING
 from flows.people import login
 from flows.servers import servers
+from tasks.approvals import gate
 from tests.flows.servers.served import CHROMIUM, LIMIT, Served, make, register
 
 if TYPE_CHECKING:

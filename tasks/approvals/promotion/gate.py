@@ -14,10 +14,9 @@ from typing import Any, Literal
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import file_hash, read_json
-from bumblebee.measured import gate
-from bumblebee.measured import gate_words as words
 from tasks import registry
-from tasks.promotion.rule import CHAMPION
+from tasks.approvals import gate, words
+from tasks.approvals.promotion.rule import CHAMPION
 from tasks.running import paths
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate
+from tasks.approvals import gate
 
 ANN, BOB = gate.unix_user("Ann"), gate.unix_user("Bob")
 

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from bumblebee.measured import overview_plots as plots
-from bumblebee.measured.gate import seen_of
-from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import Rollout
+from tasks.approvals.gate import seen_of
+from tasks.pages.overview import write_overview
 
 MODEL = """<mujoco><worldbody><body><joint name="rail" type="slide"/><geom size="0.1" mass="1"/>
 <body><joint name="pole" type="hinge"/><geom size="0.1" mass="1"/></body></body></worldbody></mujoco>"""

@@ -10,7 +10,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tests.fuzz.motion_corpus import Make
+from tests.fuzz.corpora.motion_corpus import Make
 from tests.fuzz.motion_files import change_facts, shard
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from bumblebee.evaluation.intervals import wilson
-from tasks.promotion.rule import Verdict, against_champion, against_parent, both, unchanged
+from tasks.approvals.promotion.rule import Verdict, against_champion, against_parent, both, unchanged
 
 TAGS = {"success": "0.9", "evaluation_contract": "abc", "evaluation_engine": "nominal"}
 

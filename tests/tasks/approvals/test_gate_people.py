@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate, gate_record
-from bumblebee.measured import gate_words as words
-from bumblebee.measured.gate_people import approvers, members
+from tasks.approvals import gate, ledger, words
+from tasks.approvals.people import approvers, members
 
 PAGE = gate.Author("Ann", {"how": "Prefect's page"})
 TWO = gate.GateConfig(people=2)
@@ -112,25 +111,25 @@ def test_the_record_has_every_answer_with_what_was_seen_and_shows_what_was_chang
     write(place, 5)
     gate.settle(place, True)
     folder = place.approval.parent
-    found = [entry["answer"] for entry in gate_record.check(folder)]
+    found = [entry["answer"] for entry in ledger.check(folder)]
     assert [(one["status"], one["by"].split()[0]) for one in found] == [
         ("approved", "Ann"), ("rejected", "Bob"), ("approved", "automatic"),
     ]  # fmt: skip
     assert found[0]["seen"] == found[1]["seen"] != found[2]["seen"]
-    file = folder / gate_record.NAME
+    file = folder / ledger.NAME
     lines = file.read_text().splitlines(keepends=True)
     for broken in (lines[1:], [lines[0], lines[2]], [lines[0].replace("Ann", "Eve"), *lines[1:]], [*lines, "{}\n"]):
         file.write_text("".join(broken))
         with pytest.raises(BadInput, match=r"record\.jsonl, line \d: expected what was written"):
-            gate_record.check(folder)
+            ledger.check(folder)
     file.write_text("".join(lines) + lines[0][:40])  # a kill within a line
-    assert len(gate_record.check(folder)) == 3 and file.read_text() == "".join(lines)
+    assert len(ledger.check(folder)) == 3 and file.read_text() == "".join(lines)
 
 
 @pytest.mark.parametrize("cut", [1, 2, 3])
 def test_a_record_whose_end_was_cut_is_named_also_with_the_old_request_put_back(place: gate.Gate, cut: int) -> None:
     gate.request(place)
-    file, old = place.approval.parent / gate_record.NAME, place.approval.read_text()
+    file, old = place.approval.parent / ledger.NAME, place.approval.read_text()
     for number in range(3):
         answer(place, "ann", approve=number == 1, change=True)
     lines = file.read_text().splitlines(keepends=True)
@@ -138,30 +137,30 @@ def test_a_record_whose_end_was_cut_is_named_also_with_the_old_request_put_back(
     place.approval.write_text(old)
     before = file.read_bytes()
     with pytest.raises(BadInput, match="expected the last answer that was given"):
-        gate_record.check(file.parent)
+        ledger.check(file.parent)
     with pytest.raises(BadInput, match="expected the last answer that was given") as caught:
         answer(place, "bob")
     assert place.approval.read_text() == old and file.read_bytes() == before
     subprocess.run(shlex.split(caught.value.do.partition("on purpose: ")[2]), check=True)
     answer(place, "bob")
-    assert len(gate_record.check(file.parent)) == 1
+    assert len(ledger.check(file.parent)) == 1
     file.unlink()
     with pytest.raises(BadInput, match="0 answers without it"):
-        gate_record.check(file.parent)
+        ledger.check(file.parent)
 
 
 def test_where_no_answer_was_given_a_record_is_believed_as_far_as_it_goes(place: gate.Gate) -> None:
     """As in a copy of the workspace without its private folder."""
     answer(place, "ann")
     (place.workspace / ".servers").rename(place.workspace / "elsewhere")
-    assert not gate_record.end_known(place.approval.parent) and len(gate_record.check(place.approval.parent)) == 1
+    assert not ledger.end_known(place.approval.parent) and len(ledger.check(place.approval.parent)) == 1
     answer(place, "bob")
-    assert gate_record.end_known(place.approval.parent)
+    assert ledger.end_known(place.approval.parent)
 
 
 def test_a_broken_record_takes_no_answer(place: gate.Gate) -> None:
     answer(place, "ann")
-    file = place.approval.parent / gate_record.NAME
+    file = place.approval.parent / ledger.NAME
     file.write_text(file.read_text().replace("Ann", "Eve"))
     before = place.approval.read_text()
     with pytest.raises(BadInput, match="line 1"):

@@ -1,6 +1,6 @@
 """Gates: a request that a person answers, and the answer as a file, on which the stage after an intake depends.
 
-A person approves, rejects, or asks for more rollouts; what the file says of it stands in `gate_table`. An answer holds
+A person approves, rejects, or asks for more rollouts; what the file says of it stands in `table`. An answer holds
 for one summary.json, by its hash. Whoever answers first wins; another answer must say that it changes the first. All
 answers stand in record.jsonl beside it, too, and one counts from when it stands there.
 """
@@ -16,9 +16,9 @@ from typing import Annotated, Any, Literal, Protocol
 from bumblebee.errors import BadInput
 from bumblebee.io.read import file_hash
 from bumblebee.io.write import unwritable
-from bumblebee.measured import gate_record
-from bumblebee.measured import gate_words as words
-from bumblebee.measured.gate_people import (
+from bumblebee.ranges import Range, Ranged, Text
+from tasks.approvals import ledger, words
+from tasks.approvals.people import (
     AUTOMATIC,
     ITSELF,
     Author,
@@ -27,7 +27,7 @@ from bumblebee.measured.gate_people import (
     require_allowed,
     unix_user,
 )
-from bumblebee.measured.gate_table import (
+from tasks.approvals.table import (
     LONGEST,
     OF_ANSWER,
     STATUSES,
@@ -42,7 +42,6 @@ from bumblebee.measured.gate_table import (
     with_answer,
     write_json,
 )
-from bumblebee.ranges import Range, Ranged, Text
 
 __all__ = [
     "ANSWERS",
@@ -156,7 +155,7 @@ def seen_of(summary: Path) -> dict[str, Any]:
 
 
 def request(gate: Question, automatic: bool = False, people: int = 1) -> dict[str, Any]:
-    """The request with its answer, if one stands (`gate_table.stands`); else a new one: the old answer is history."""
+    """The request with its answer, if one stands (`table.stands`); else a new one: the old answer is history."""
     old = read_approval(gate.approval) if gate.approval.exists() else None
     if old and stands(old, gate.sha256(), automatic, people) and _recorded_alone(gate, old) is None:
         return old
@@ -265,7 +264,7 @@ def _caught_up(gate: Question, old: dict[str, Any], people: int) -> dict[str, An
 
 def _recorded_alone(gate: Question, old: dict[str, Any]) -> dict[str, Any] | None:
     """The record's last answer to what the table shows, where the table does not have it."""
-    entry = gate_record.last(gate.approval.parent, gate.subject)
+    entry = ledger.last(gate.approval.parent, gate.subject)
     if entry is None or entry["seen"].get("sha256") != old["seen"].get("sha256") or holds(old, entry):
         return None
     return {key: entry[key] for key in OF_ANSWER}
@@ -275,7 +274,7 @@ def _keep(gate: Question, table: dict[str, Any]) -> None:
     """Write a table that somebody has answered; the answer stands in the record, too, with what it answers."""
     last = table if table["status"] != "pending" else {**table, **table["approvals"][-1]}
     entry = {key: last[key] for key in (*gate.subject, *OF_ANSWER, "seen")}
-    gate_record.append(gate.approval.parent, entry)
+    ledger.append(gate.approval.parent, entry)
     write_json(gate.approval, table)
 
 

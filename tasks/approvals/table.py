@@ -16,8 +16,8 @@ from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
 from bumblebee.io.read import read_json
 from bumblebee.io.write import write_file
-from bumblebee.measured import gate_words as words
-from bumblebee.measured.gate_people import Author, approvers, is_automatic, login_of
+from tasks.approvals import words
+from tasks.approvals.people import Author, approvers, is_automatic, login_of
 
 Table = dict[str, Any]
 WAITS = ("pending", "more")

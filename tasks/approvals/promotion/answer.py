@@ -4,9 +4,8 @@ from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
-from bumblebee.measured import gate
-from bumblebee.measured import gate_words as words
-from tasks.promotion.gate import Promotion, require_as_shown, require_no_champion, settle
+from tasks.approvals import gate, words
+from tasks.approvals.promotion.gate import Promotion, require_as_shown, require_no_champion, settle
 from tasks.publish import PublishConfig
 from tasks.settings.params import load
 

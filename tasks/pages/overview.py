@@ -16,9 +16,9 @@ import pandas as pd
 from bumblebee.io.page_policy import policy_tag
 from bumblebee.io.read import file_hash
 from bumblebee.measured import overview_plots as plots
-from bumblebee.measured.gate_words import NOTES, SHORT
 from bumblebee.measured.overview_plots import Trace, tracking
 from bumblebee.measured.rollout import Rollout
+from tasks.approvals.words import NOTES, SHORT
 
 __all__ = ["Trace", "tracking", "write_overview"]
 

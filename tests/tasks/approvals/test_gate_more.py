@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate, gate_record
-from bumblebee.measured import gate_words as words
-from tests.measured.gates.test_gate_people import TWO, person, write
+from tasks.approvals import gate, ledger, words
+from tests.tasks.approvals.test_gate_people import TWO, person, write
 
 WISH = "walks on the wet floor"
 
@@ -30,7 +29,7 @@ def say(place: gate.Gate, verb: str, login: str, people: int = 1, **more: Any) -
 
 
 def record(place: gate.Gate) -> list[dict[str, Any]]:
-    return [entry["answer"] for entry in gate_record.check(place.approval.parent)]
+    return [entry["answer"] for entry in ledger.check(place.approval.parent)]
 
 
 def test_the_round_waits_on_and_says_who_asked_for_what_and_how_it_goes_on(place: gate.Gate) -> None:

@@ -11,16 +11,16 @@ from typer.testing import CliRunner
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.export import write_export
-from bumblebee.measured import gate, gate_record
 from bumblebee.tracking.sampling.library import AHEAD
-from bumblebee.wire.policy_end.registered import let_through
 from flows.gates.gate_cli import app
 from tasks import publish
-from tasks.promotion import answer as promotion_answer
-from tasks.promotion import gate as promotion_gate
-from tests.measured.gates.test_gate_people import person
+from tasks.approvals import gate, ledger
+from tasks.approvals.promotion import answer as promotion_answer
+from tasks.approvals.promotion import gate as promotion_gate
+from tasks.approvals.promotion.approved import let_through
 from tests.policy.conftest import linear_onnx
 from tests.tasks import test_publish as of_publish
+from tests.tasks.approvals.test_gate_people import person
 from tests.tasks.test_publish import PARAMS, evaluated, trained_again, written
 
 
@@ -94,7 +94,7 @@ def test_an_approval_moves_the_alias_of_this_model_alone_and_says_who_saw_what(r
     table = say("approve")
     version = written()["models"]["generalist"]["version"]
     assert registry.champions == {"generalist": version} and registry.described == {"generalist": f"card of {version}"}
-    (line,) = [entry["answer"] for entry in gate_record.check(Path("data/approvals"))]
+    (line,) = [entry["answer"] for entry in ledger.check(Path("data/approvals"))]
     policy = gate.file_hash(Path("models/generalist/policy.onnx"))
     assert (line["model"], line["status"], line["known_by"]["user"]) == ("generalist", "approved", "ann")
     assert line["seen"] == table["seen"] and line["seen"]["onnx_sha256"] == policy
