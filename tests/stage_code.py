@@ -57,6 +57,7 @@ NO_RESULT_OF = {
         "tasks/approvals/words.py": _PAGE,
         "tasks/pages/overview.py": _PAGE,
         "bumblebee/measured/overview_plots.py": _PAGE,
+        "bumblebee/report/": _PAGE,
         **{
             f"tasks/approvals/{name}.py": "who answers, and how; the request is not its result"
             for name in ("people", "table")

@@ -101,9 +101,8 @@ def write_beside(options: argparse.Namespace) -> None:
     """Write the tables of several runs beside each other."""
     from benchmarks.method.beside import beside
 
-    motions = read_motions(options.motions)
-    text = beside(options.runs, motions)
-    write_file(options.out, f"<!-- motions {motions.hash} -->\n\n{text}")
+    text = beside(options.runs, read_motions(options.motions))
+    write_file(options.out, text)
     print(text, end="")
 
 

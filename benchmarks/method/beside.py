@@ -22,9 +22,10 @@ def beside(runs: Sequence[Path], motions: Motions) -> str:
     Raises:
         BadInput: if a run is of other motions or settings, or nothing in it was tried.
     """
-    rows = pd.concat([_tried(run, motions) for run in runs], ignore_index=True)
+    tried = [_tried(run, motions) for run in runs]
+    rows = pd.concat([table for table, _ in tried], ignore_index=True)
     names = {f"{key} {name}": f"{ROWS[key]}, {LEARNERS[name]}" for name in NAMED for key in (BASE, OWN)}
-    parts = []
+    parts = [f"<!-- methods {' '.join(stamp for _, stamp in tried)}, motions {motions.hash} -->\n"]
     for robot, own in rows.groupby("robot"):
         parts.append(f"### {robot} robots\n\n{methods_table(own, names, 'all seeds')}\n{_seeds(own, names)}")
         if pairs := _pairs(own):
@@ -32,17 +33,17 @@ def beside(runs: Sequence[Path], motions: Motions) -> str:
     return "\n".join(parts)
 
 
-def _tried(run: Path, motions: Motions) -> pd.DataFrame:
-    """Trials of a run's base policy and of its experts, with learner and seed."""
+def _tried(run: Path, motions: Motions) -> tuple[pd.DataFrame, str]:
+    """Trials of a run's base policy and of its experts, with learner and seed; the hash of what the run is held to."""
     began = frozen(run)
     name, seed = began["settings"], began["study"]["seed"]
     method: Method = chosen(name, seed)
-    freeze(run, method, settings=name, motions=motions.hash)
+    stamp = freeze(run, method, settings=name, motions=motions.hash)
     tables = [(key, read(run, key, "tried", method, motions)) for key in (BASE, OWN)]
     found = [table.assign(arm=f"{key} {name}", seed=seed) for key, table in tables if table is not None]
     if not found:
         raise BadInput(run, "trials of the base policy", "none", "Run `benchmarks.method run` on until they are done.")
-    return pd.concat(found, ignore_index=True)
+    return pd.concat(found, ignore_index=True), stamp
 
 
 def _seeds(rows: pd.DataFrame, names: dict[str, str]) -> str:

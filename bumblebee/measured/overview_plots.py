@@ -3,6 +3,7 @@
 Every string that came from outside is escaped. Hinges are in rad and mrad, slides in m and mm, never in one picture.
 """
 
+from base64 import b64encode
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from html import escape
@@ -118,5 +119,11 @@ def plot(trace: Trace, slide: bool, headed: bool = True) -> str:
     return _svg(HEIGHT, label, text + line(trace.command, "#8a94a6") + line(trace.measured, "#d97706"))
 
 
+def data_uri(svg: str) -> str:
+    """A picture as an address that holds it."""
+    return f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}"
+
+
 def _svg(height: int, title: str, inner: str) -> str:
-    return f"<svg viewBox='0 0 {WIDTH} {height}' role='img'><title>{escape(title)}</title>{inner}</svg>"
+    space = "xmlns='http://www.w3.org/2000/svg'"
+    return f"<svg {space} viewBox='0 0 {WIDTH} {height}' role='img'><title>{escape(title)}</title>{inner}</svg>"

@@ -1,13 +1,12 @@
 """The page after a run: how it ended, what came, how the robot followed, and the way to findings."""
 
-from base64 import b64encode
 from collections.abc import Mapping
 from pathlib import Path
 from shlex import join
 
 import numpy as np
 
-from bumblebee.measured.overview_plots import Trace, plot
+from bumblebee.measured.overview_plots import Trace, data_uri, plot
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.report.page import Block, Section, bullets, image, note, pairs, render, table, text, warning
 
@@ -65,9 +64,7 @@ def _curve(measured: Rollout, joint: int, error: float) -> Block:
     name, time = measured.joints[joint], measured.time - measured.time[0]
     motion = str(measured.meta.get("motion", ""))
     trace = Trace(motion, name, error, time, measured.joint_target[:, joint], measured.joint_pos[:, joint])
-    svg = plot(trace, slide=False, headed=False).replace("<svg ", "<svg xmlns='http://www.w3.org/2000/svg' ", 1)
-    uri = f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}"
-    return image(uri, name, f"{1000 * error:.0f} mrad RMS")
+    return image(data_uri(plot(trace, slide=False, headed=False)), name, f"{1000 * error:.0f} mrad RMS")
 
 
 def _next(measured: Rollout, out: Path, workspace: Path) -> list[Block]:

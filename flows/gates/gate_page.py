@@ -3,7 +3,6 @@
 Prefect renders tables, links and pictures that lie in the text itself (data URIs); nothing is loaded from elsewhere.
 """
 
-import base64
 import csv
 import io
 import re
@@ -131,9 +130,8 @@ def pictures(place: gate.Gate) -> list[str]:
 
 def picture(svg: str, name: str) -> str:
     """An SVG that lies in the text, on white also where the page is dark."""
-    size = "xmlns='http://www.w3.org/2000/svg' width='720' height='300' style='background:#fff'"
-    alone = svg.replace("<svg ", f"<svg {size} ", 1)
-    return f"![{cell(name)}](data:image/svg+xml;base64,{base64.b64encode(alone.encode()).decode()})"
+    sized = svg.replace("<svg ", "<svg width='720' height='300' style='background:#fff' ", 1)
+    return f"![{cell(name)}]({overview_plots.data_uri(sized)})"
 
 
 def verdicts(counts: dict[str, dict[str, int]]) -> list[tuple[str, int, int]]:
