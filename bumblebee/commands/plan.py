@@ -43,9 +43,15 @@ def plan(
     kd: Annotated[float | None, typer.Option(help="kd of that servo.")] = None,
     pool: Annotated[int, typer.Option(min=4, max=1000, help="Candidate motions to choose from.")] = 48,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the candidate motions.")] = 0,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="Time for the whole of it; of the candidates as many as it leaves.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier plan.")] = False,
 ) -> None:
-    """Runs for the robot that tell apart what a diagnosis could not, within all limits, with a run sheet."""
+    """Runs for the robot that tell apart what a diagnosis could not, within all limits, with a run sheet.
+
+    With --minutes, Ctrl-C or SIGTERM ends the search, and runs are chosen from the candidates that were looked at.
+    """
     from bumblebee.diagnosis.plan import PlanConfig, summary, write_plan
     from bumblebee.sim.quiet import quiet_mujoco
 
@@ -57,7 +63,7 @@ def plan(
         speed=by_joint("--speed", speed), torque=by_joint("--torque", torque),
         travel=by_joint("--travel", travel), kp=kp, kd=kd,
     )  # fmt: skip
-    told = write_plan(_made(model, dataset, diagnosis, config), out, overwrite)
+    told = write_plan(_made(model, dataset, diagnosis, config, minutes), out, overwrite)
     print(plain(summary(told)))
     print(f"written: {out / 'plan.json'}, sheet.html, runs/*.csv, runs/*.parquet")
 
@@ -78,19 +84,29 @@ def _claim(model: Path, dataset: Path | None, diagnosis: Path | None, out: Path,
         )
 
 
-def _made(model: Path, dataset: Path | None, diagnosis: Path | None, config: "PlanConfig") -> "Plan":
-    """Read what there is and plan, with a line a step."""
+def _made(
+    model: Path, dataset: Path | None, diagnosis: Path | None, config: "PlanConfig", minutes: float | None
+) -> "Plan":
+    """Read what there is and plan, with a line a step; in some minutes, or until a signal asks for the end."""
     from bumblebee.diagnosis.dataset import open_session
     from bumblebee.diagnosis.plan import make_plan, read_findings
+    from bumblebee.diagnosis.simulation import Stop
+    from bumblebee.first_signal import first_signal
     from bumblebee.measured.model_file import load_spec
 
+    stop = Stop() if minutes is None else Stop(minutes)
+
+    def say(text: str) -> None:
+        print(plain(f"[{time.monotonic() - stop.began:5.1f} s] {text}"), flush=True)
+
+    def ask() -> bool:
+        stop.asked = True
+        return stop.searching
+
     findings = read_findings(diagnosis) if diagnosis else None
-    session = open_session(model, dataset, config.thresholds.dataset) if dataset else None
-    began = time.monotonic()
-    return make_plan(
-        load_spec(model), model.name, config, session, findings,
-        lambda text: print(plain(f"[{time.monotonic() - began:5.1f} s] {text}"), flush=True),
-    )  # fmt: skip
+    with first_signal(ask):
+        session = open_session(model, dataset, config.thresholds.dataset) if dataset else None
+        return make_plan(load_spec(model), model.name, config, session, findings, say, stop)
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:

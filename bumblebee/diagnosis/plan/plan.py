@@ -1,5 +1,7 @@
 """The next experiment: safe runs, chosen to tell apart what a diagnosis could not and to narrow what it knows."""
 
+import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,15 +18,15 @@ from bumblebee.diagnosis.plan.findings import Findings
 from bumblebee.diagnosis.plan.information import Lens, information_of, lens_of, logs_of
 from bumblebee.diagnosis.plan.limits import Limits
 from bumblebee.diagnosis.plan.machine import Machine
-from bumblebee.diagnosis.plan.motions import Motion
+from bumblebee.diagnosis.plan.motions import FAMILIES, Motion
 from bumblebee.diagnosis.plan.objective import Objective, imitations, objective_of
 from bumblebee.diagnosis.plan.plausible import implausible
-from bumblebee.diagnosis.plan.pool import refuse_none, resting, safe_pool, set_stage, surest
+from bumblebee.diagnosis.plan.pool import candidates, refuse_none, resting, set_stage, surest
 from bumblebee.diagnosis.plan.rehearsal import rehearse
-from bumblebee.diagnosis.plan.safety import Safe, proven
+from bumblebee.diagnosis.plan.safety import LATE, Safe, made_safe, proven
 from bumblebee.diagnosis.plan.stage import Stage
 from bumblebee.diagnosis.plan.unknowns import Case, cases_of
-from bumblebee.diagnosis.simulation import Plant
+from bumblebee.diagnosis.simulation import Plant, Stop
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect
 
@@ -70,10 +72,14 @@ def make_plan(
     session: Session | None = None,
     findings: Findings | None = None,
     say: Callable[[str], None] = lambda text: None,
+    stop: Stop | None = None,
 ) -> Plan:
-    """Plan runs on the robot of `spec`; with the session of a dataset and what its diagnosis found, what it lacks."""
+    """Plan runs on the robot of `spec`; with the session of a dataset and what its diagnosis found, what it lacks.
+
+    Where `stop` limits the time, as many of the candidates are looked at as it leaves.
+    """
     with threadpool_limits(1, user_api="blas"):  # as in a diagnosis: many small matrices
-        return _make_plan(spec, name, config or PlanConfig(), session, findings, say)
+        return _make_plan(spec, name, config or PlanConfig(), session, findings, say, stop or Stop())
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +99,7 @@ def _make_plan(
     session: Session | None,
     findings: Findings | None,
     say: Callable[[str], None],
+    stop: Stop,
 ) -> Plan:
     """Make a plan on the threads that there are."""
     stage = set_stage(spec, name, config, session, findings)
@@ -100,15 +107,54 @@ def _make_plan(
     if session is not None:
         known = _measured(stage.machine, session, findings, config)
         stage = _with_rivals(stage, session, known, findings, config)
-    say(f"simulating {config.pool} candidate motions")
-    safe = safe_pool(surest(stage), config)
-    refuse_none(safe, say)
-    say(f"{len(safe.motions)} of them are safe; computing their information")
     ask = _Asking(stage, findings.effects if findings else (), _windows(stage.machine, config))
-    logs = ask.logs(safe.motions)
-    if known is None:
-        known = _unmeasured(stage.machine, logs, config)
-    return _chosen(ask, safe, known, ask.told(safe.motions, known.lens, logs), (config, findings), say)
+    safe, told, known = _looked_at(ask, known, config, say, stop)
+    return _chosen(ask, safe, known, told, (config, findings), say, stop)
+
+
+def _looked_at(
+    ask: "_Asking", known: _Known | None, config: PlanConfig, say: Callable[[str], None], stop: Stop
+) -> tuple[Safe, np.ndarray, _Known]:
+    """The candidates that are safe, and the information (R, N, N) of each; all at once where nothing limits the time.
+
+    Else one of each family after the other, until what is left of the time is what rehearsing the chosen ones takes.
+    """
+    stage, motions = ask.stage, candidates(ask.stage, config)
+    size = config.pool if np.isinf(stop.minutes) else len(FAMILIES)
+    safe, told, began = Safe([], np.zeros((0, 3, len(stage.machine.home))), Counter()), [], time.monotonic()
+    say(f"simulating {config.pool} candidate motions")
+    for first in range(0, config.pool, size):
+        part = made_safe(surest(stage), motions[first : first + size])
+        seen = first + size
+        each = (time.monotonic() - began) / seen
+        safe = safe.and_(part)
+        if part.motions:
+            logs = ask.logs(part.motions)
+            known = known or _unmeasured(stage.machine, logs, config)
+            told.append(ask.told(part.motions, known.lens, logs))
+        stop.searching = bool(safe.motions)
+        ahead = each * (size + _rehearsals(stage, config))
+        if seen < config.pool and known and told and stop.before(ahead + _choosing(known, told, config.runs)):
+            safe.refused[LATE] += config.pool - seen
+            break
+        if seen < config.pool:
+            say(f"{seen} of {config.pool} candidates were looked at, {len(safe.motions)} of them are safe")
+    refuse_none(safe, say)
+    assert known is not None
+    say(f"{len(safe.motions)} of them are safe, with their information")
+    return safe, np.concatenate(told), known
+
+
+def _choosing(known: _Known, told: Sequence[np.ndarray], runs: int) -> float:
+    """Time [s] that the choice among the candidates takes, by what one look at one of them takes."""
+    began = time.monotonic()
+    known.objective.value(known.data + told[0][0])
+    return (time.monotonic() - began) * sum(map(len, told)) * runs * (1 + known.objective.rule.exchanges)
+
+
+def _rehearsals(stage: Stage, config: PlanConfig) -> float:
+    """Candidates whose time the rehearsals of the chosen runs take: on all robots, in long steps and in fine ones."""
+    return config.runs * len(stage.cases) / len(surest(stage).cases) * (1.0 + stage.step / stage.machine.steps[0])
 
 
 def _measured(machine: Machine, session: Session, findings: Findings | None, config: PlanConfig) -> _Known:
@@ -208,16 +254,19 @@ def _chosen(
     told: np.ndarray,
     asked: tuple[PlanConfig, Findings | None],
     say: Callable[[str], None],
+    stop: Stop,
 ) -> Plan:
     """The best runs that are safe on all robots in fine steps.
 
     Those that are chosen are tried on all of them; what had to be made smaller is asked again what it tells, what is
-    never safe is left out, and the choice is made again until all that is chosen was tried as it is.
+    never safe is left out, and the choice is made again until all that is chosen was tried as it is; once the time is
+    over, among those that were.
     """
     config, findings = asked
     stage, motions, refused = ask.stage, list(safe.motions), safe.refused.copy()
     tried: dict[int, np.ndarray] = {}  # motion -> the shares (3, J) of the limits that it reaches
     shut: list[int] = []
+    each = 0.0  # seconds of a rehearsal
     while True:
         picked = choose(known.objective, known.data, told, config.runs, shut)
         if not picked:
@@ -225,8 +274,13 @@ def _chosen(
         new = [r for r in picked if r not in tried]
         if not new:
             break
+        if tried and stop.before(each * len(new)):
+            shut += [r for r in range(len(motions)) if r not in {*tried, *shut}]
+            continue
         say(f"rehearsing {len(new)} runs on each of {len(stage.cases)} robots")
+        began = time.monotonic()
         proof = proven(stage, [motions[r] for r in new])
+        each = (time.monotonic() - began) / len(new)
         refused += proof.refused
         found = {m.number: (m, reached) for m, reached in zip(proof.motions, proof.reached, strict=True)}
         shut += [r for r in new if motions[r].number not in found]

@@ -52,17 +52,21 @@ def _rough_step(machine: Machine, declared: float, config: PlanConfig) -> float:
     return max(machine.steps[0], step_for(1.0 / machine.rate, min(rule.coarse, declared), rule))
 
 
-def safe_pool(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMILIES) -> Safe:
-    """The candidate motions of a seed, as far as they are safe."""
+def candidates(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMILIES) -> list[Motion]:
+    """The candidate motions of a seed, a family after the other."""
     gains = [gain for gain in config.all_gains if gain in stage.machine.driven]
     if not gains:
         why = "; ".join(f"{gain}: {reason}" for gain, reason in stage.restless.items())
         raise BadInput("--gains", "gains at which the robot rests in the start pose", why, "Allow 1, or others.")
-    motions = [
+    return [
         draw_motion(stage.scope, config.seed, k, gains[(k // len(families)) % len(gains)], families)
         for k in range(config.pool)
     ]
-    return made_safe(stage, motions)
+
+
+def safe_pool(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMILIES) -> Safe:
+    """The candidate motions of a seed, as far as they are safe."""
+    return made_safe(stage, candidates(stage, config, families))
 
 
 def surest(stage: Stage) -> Stage:

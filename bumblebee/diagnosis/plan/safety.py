@@ -12,6 +12,9 @@ from bumblebee.diagnosis.plan.motions import Motion
 from bumblebee.diagnosis.plan.rehearsal import Rehearsed, rehearse
 from bumblebee.diagnosis.plan.stage import Stage
 
+LATE = "not looked at: the time was over"
+"""Why a candidate was given up where the time is limited."""
+
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -87,6 +90,11 @@ class Safe:
     """(R, 3, J) largest shares of travel, speed and torque over the cases."""
     refused: Counter[str]
     """Why others were given up -> how many."""
+
+    def and_(self, more: "Safe") -> "Safe":
+        """Together with others."""
+        shares = np.concatenate((self.reached, more.reached))
+        return Safe([*self.motions, *more.motions], shares, self.refused + more.refused)
 
 
 def made_safe(stage: Stage, motions: Sequence[Motion], step: float | None = None) -> Safe:

@@ -13,7 +13,7 @@ class OutOfTime(Exception):
 
 @dataclass(eq=False)
 class Stop:
-    """The reasons for which a diagnosis ends its searches early, and reports what it has."""
+    """The reasons for which a diagnosis or a plan ends its search early, and reports what it has."""
 
     minutes: float = float("inf")
     """Time for the whole of it [min], by the clock."""
@@ -31,9 +31,11 @@ class Stop:
 
     def over(self, effects: int) -> bool:
         """Whether the user asked, or the time left is what the last fit, intervals and errors of so many take."""
-        gone = time.monotonic() - self.began
-        ahead = self.opened * (self.last_fit + self.an_effect * effects)
-        return self.asked or gone + ahead > 60.0 * self.minutes
+        return self.before(self.opened * (self.last_fit + self.an_effect * effects))
+
+    def before(self, ahead: float) -> bool:
+        """Whether the user asked, or what takes `ahead` [s] would end after the time."""
+        return self.asked or time.monotonic() - self.began + ahead > 60.0 * self.minutes
 
 
 _OVER: ContextVar[Callable[[], bool] | None] = ContextVar("over", default=None)

@@ -7,6 +7,7 @@ import numpy as np
 from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.plan import Plan
 from bumblebee.diagnosis.plan.predicted import classes, intervals, narrows, pairs, separates, usual, words_of
+from bumblebee.diagnosis.plan.safety import LATE
 from bumblebee.diagnosis.simulation import joint_units
 
 
@@ -107,6 +108,8 @@ def notes(plan: Plan) -> list[str]:
     ]
     if not plan.checked:
         out.append("the model has no geometry that can touch: look for collisions yourself, at low speed first")
+    if late := plan.refused.get(LATE):
+        out.append(f"{late} of {plan.config.pool} candidates were not looked at: the time was over")
     out += [f"no run at {gain}: {reason}" for gain, reason in plan.restless.items()]
     out += _left_out(plan)
     if plan.basis.unasked:
