@@ -112,7 +112,7 @@ def test_logs_are_diagnosed(installed: Path, tmp_path: Path) -> None:
     for rollout in arm.simulate({("viscous_friction", "j2"): 2.0}, count=4):
         write_rollout(tmp_path / "logs/rollouts" / f"{rollout.rollout_id}.parquet", rollout)
     (tmp_path / "arm.xml").write_text(arm.XML)
-    done = call(installed, tmp_path, "diagnose", "arm.xml", "logs", "--out", "found", "--max-windows", "22")
+    done = call(installed, tmp_path, "diagnose", "arm.xml", "logs", "--out", "found", "--max-windows", "10")
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "found/diagnosis.json").read_text())["effects"]
     assert [(e["effect"], e["where"]) for e in found] == [("viscous_friction", ["j2"])]
