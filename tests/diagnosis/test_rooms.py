@@ -54,7 +54,9 @@ NO_THRESHOLDS = {
     "report/effect_entries.py": {"_COMPARABLE"},
     "residuals/nuisances.py": {"_LEAST_ARMATURE"},
     "selection/proposals/gain_grid.py": {"_LEAST_FACTOR"},
+    "estimation/covariance.py": {"_TOLD"},
     "simulation/actuators.py": {"_FEEDBACK"},
+    "simulation/collision_culling.py": {"_LEVEL"},
     "simulation/starts/hidden_states.py": {"_LEAD_ERROR"},
     "simulation/windows.py": {"_LEAD_SHARE", "_BRIEF"},
     "selection/proposals/loss_likelihoods.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile

@@ -7,6 +7,9 @@ from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.least_squares import project
 from bumblebee.diagnosis.residuals import Problem
 
+_TOLD = 1e-6
+"""Chi-square of a change that matters, below which the windows say nothing of a parameter."""
+
 
 def covariance(problem: Problem, fit: Fit, weights: np.ndarray, clusters: np.ndarray) -> np.ndarray:
     """Covariance (P, P) of the values by leaving out one cluster (W,) after the other; 0 for what is not fitted.
@@ -93,7 +96,7 @@ def interval(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
         wide = student.ppf(0.975, freedom(problem, fit, weights, groups)) * _errors(problem, fit, weights, groups)
         half = np.maximum(half, wide)
     told = (weights[:, None] * fit.columns**2).sum(axis=(1, 2))
-    half[np.flatnonzero(fit.scales)[told < problem.thresholds.estimation.covariance.told]] = np.inf
+    half[np.flatnonzero(fit.scales)[told < _TOLD]] = np.inf
     return np.maximum(half, _unmodelled(fit, problem.thresholds.estimation.covariance.backlash_error))
 
 

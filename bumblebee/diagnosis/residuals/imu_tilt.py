@@ -13,7 +13,8 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import IMU_TILT
 from bumblebee.diagnosis.residuals.whitening import Whitener
-from bumblebee.diagnosis.simulation import Layout
+from bumblebee.diagnosis.simulation import Layout, Plant, Windows, heights_of
+from bumblebee.quaternions import conjugate, from_rotation_vector, multiply
 from bumblebee.sim.effects import Effect
 
 
@@ -44,3 +45,26 @@ def tilt_columns(whitener: Whitener, layout: Layout, sigma: np.ndarray, ticks: i
         read[:, first + axis] = 1.0
         out[axis] = -whitener.slopes[:, first + axis] / sigma[first + axis] - whitener.factor @ read.ravel()
     return out
+
+
+def raised_by_tilt(plant: Plant, windows: Windows, now: np.ndarray, turn: float) -> np.ndarray:
+    """How much higher (2, W) [m/rad] the base stands on its feet, for a sensor with more roll and with more pitch.
+
+    Args:
+        plant: the declared model.
+        windows: W windows, whose bases' heights are taken from stance.
+        now: roll and pitch (2,) [rad] that the sensor has.
+        turn: by which it is differentiated to both sides [rad], so that a foot's both ends are felt.
+    """
+    at, out = slice(plant.base_qpos + 3, plant.base_qpos + 7), []
+    for more in turn * np.eye(2):
+        high, low = (heights_of(plant, _turned_back(windows.qpos, at, now + side)) for side in (more, -more))
+        out.append((high - low) / (2.0 * turn))
+    return np.stack(out)
+
+
+def _turned_back(qpos: np.ndarray, at: slice, tilt: np.ndarray) -> np.ndarray:
+    """States (W, nq) whose base stands as it is by a sensor with a roll and pitch (2,) [rad]."""
+    qpos = qpos.copy()
+    qpos[:, at] = multiply(qpos[:, at], conjugate(from_rotation_vector(np.append(tilt, 0.0))))
+    return qpos

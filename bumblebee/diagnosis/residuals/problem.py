@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, possible_beside, rough, without
-from bumblebee.diagnosis.residuals.imu_tilt import angles, retilted, tilt_columns, tilt_of
+from bumblebee.diagnosis.residuals.imu_tilt import angles, raised_by_tilt, retilted, tilt_columns, tilt_of
 from bumblebee.diagnosis.residuals.initial_state import restarted, start_moves
 from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
 from bumblebee.diagnosis.residuals.whitening import NoisyWindows, Stepped, Whitener, fit_whitener
@@ -97,7 +97,12 @@ class Problem:
     @cached_property
     def _tilting(self) -> np.ndarray:
         """(2, W, M)."""
-        return tilt_columns(self.whitener, self.layout, self.sigma, self.windows.out_time.shape[1])
+        out = tilt_columns(self.whitener, self.layout, self.sigma, self.windows.out_time.shape[1])
+        if self.windows.stance:
+            turn, noise = self.thresholds.candidates.body.tilt, self.thresholds.residuals.whitening.height_noise
+            raised = raised_by_tilt(self.plant, self.windows, angles(self.tilt), turn) / noise
+            out += raised[..., None] * self.whitener.slopes[:, -1]
+        return out
 
     def differences(self, effects: Sequence[Effect], moved: Sequence[Sequence[Effect]], coarse: bool) -> np.ndarray:
         """How the prediction changes from a model to several others, (V, W, M), both sides simulated in one step."""

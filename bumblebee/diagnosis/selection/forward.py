@@ -16,7 +16,7 @@ from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.changes import Asking, Loss
-from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints, whiten_where_it_leans
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
 from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
 from bumblebee.diagnosis.selection.proposals.gain_grid import start_with_gain_grid
@@ -174,6 +174,7 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         accepted = attempt(name, partial(run.accept, best.candidate, best.values), partial(run.refuse, best.candidate))
         vain = 0 if accepted else vain + 1
         if accepted:
+            attempt("the tilt of the base's sensor", partial(go, run, whiten_where_it_leans), _no)
             attempt("a torque limit in the place of a weak drive", partial(go, run, swap_limits), _no)
             run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
 

@@ -33,6 +33,7 @@ from bumblebee.diagnosis.simulation.starts.actuator_history import (
     window_servos,
     yielded,
 )
+from bumblebee.diagnosis.simulation.starts.base_height import heights_of
 from bumblebee.diagnosis.simulation.starts.setpoints import begin_setpoints, setpoints_of
 from bumblebee.diagnosis.simulation.stop import OutOfTime, Stop, ending
 from bumblebee.diagnosis.simulation.units import (
@@ -79,6 +80,7 @@ __all__ = [
     "difference",
     "effects_in_words",
     "ending",
+    "heights_of",
     "in_words",
     "inputs_of",
     "joint_path",

@@ -1,6 +1,6 @@
 """Windows and variations that run in one batch, and the states that they start from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mujoco.batch import Batch
@@ -11,6 +11,7 @@ from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.roll import roll
 from bumblebee.diagnosis.simulation.starts.activations import activations
 from bumblebee.diagnosis.simulation.starts.actuator_history import read_at
+from bumblebee.diagnosis.simulation.starts.base_height import heights_of
 from bumblebee.diagnosis.simulation.starts.hidden_states import Known, earlier, restructured, set_plastic
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows
@@ -70,14 +71,32 @@ class Chunk:
             qvel = np.repeat(windows.qvel[None], len(self.chosen), axis=0)
         else:
             qpos, qvel = self.starts.qpos.copy(), self.starts.qvel
-        qpos[..., plant.qpos] -= self.offset
-        if late.any():
-            qpos, qvel = _caught_up(plant, windows, qpos, qvel, late)
-        if lead.tilt is not None:
-            qpos, qvel = _righted(plant, qpos, qvel, lead.tilt)
+        qpos, qvel = self._as_it_was(qpos, qvel, late)
+        if windows.stance:
+            qpos[..., plant.base_qpos + 2] += self._raised(late)
         if lead.plant is not None:
             qpos, qvel = restructured(plant, windows, lead, qpos, qvel, _led_in(plant, windows, lead, self.step))
         return qpos, qvel
+
+    def _as_it_was(self, qpos: np.ndarray, qvel: np.ndarray, late: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States (..., W, nq), (..., W, nv) that were read, as they were by what the variations say of the sensors."""
+        qpos = qpos.copy()
+        qpos[..., self.plant.qpos] -= self.offset
+        if late.any():
+            qpos, qvel = _caught_up(self.plant, self.windows, qpos, qvel, late)
+        if self.lead.tilt is not None:
+            qpos, qvel = _righted(self.plant, qpos, qvel, self.lead.tilt)
+        return qpos, qvel
+
+    def _raised(self, late: np.ndarray) -> np.ndarray:
+        """How much higher (V, W) [m] the base stands than the readings as they are put it: its feet touch the floor."""
+        offsets, which = np.unique(self.offset[:, 0], axis=0, return_inverse=True)
+        if self.lead.tilt is None and not late.any() and not offsets.any():
+            return np.zeros((len(self.chosen), len(self.windows)))
+        read, speed = self.windows.qpos[None], self.windows.qvel[None]
+        first = [self.chosen[int(np.argmax(which == k))] for k in range(len(offsets))]
+        right, _ = replace(self, chosen=first, starts=None)._as_it_was(read, speed, late)
+        return (heights_of(self.plant, right) - heights_of(self.plant, read))[which]
 
 
 def lateness(plant: Plant, lead: Variation) -> np.ndarray:

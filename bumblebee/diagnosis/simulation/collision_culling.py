@@ -16,6 +16,9 @@ from bumblebee.diagnosis.simulation.windows import Windows
 
 _known: WeakKeyDictionary[Windows, np.ndarray] = WeakKeyDictionary()
 
+_LEVEL = 1e-6
+"""By how much the cosine of a floor's slope may lack of 1."""
+
 
 def out_of_reach(plant: Plant, windows: Windows) -> np.ndarray:
     """Ids (K,) of geometries that can touch floors alone and are too far above them at the start of every window."""
@@ -47,7 +50,7 @@ def _found(plant: Plant, windows: Windows) -> np.ndarray:
         return np.empty(0, dtype=int)
     data, plane = mujoco.MjData(model), int(mujoco.mjtGeom.mjGEOM_PLANE)
     mujoco.mj_kinematics(model, data)
-    if not all(model.geom_type[g] == plane and data.geom_xmat[g, 8] > 1 - rule.level for g in fixed):
+    if not all(model.geom_type[g] == plane and data.geom_xmat[g, 8] > 1 - _LEVEL for g in fixed):
         return np.empty(0, dtype=int)
     floor = max((data.geom_xpos[g, 2] for g in fixed), default=-np.inf)
     clear = np.full(len(some), np.inf)

@@ -49,6 +49,8 @@ class Windows:
     """(W,) number of the condition that it was recorded under, as the plant counts them."""
     source: Sequence[Rollout] = ()
     """The rollouts that `rollout` counts, for what drives remember from before the start."""
+    stance: bool = False
+    """Whether the base's height is not measured but taken from stance, by the readings as they are."""
 
     def __len__(self) -> int:
         return len(self.start)
@@ -151,6 +153,7 @@ def cut(
         command_time=np.stack([_pad(row.command_time, size) for row in rows]),
         condition=np.array([plant.under.get(rollouts[s[0]].rollout_id, 0) for s in starts]),
         source=rollouts,
+        stance=_needs_height(plant, layout),
     )
 
 

@@ -11,8 +11,6 @@ class Covariance:
     """Rollouts from which on their differences are believed: fewer say little about how much rollouts differ."""
     backlash_error: float = 0.35
     """Share of a backlash that its interval has at least to either side: five came out at 57 to 93 % of their size."""
-    told: float = 1e-6
-    """Chi-square of a change that matters, below which the windows say nothing of a parameter."""
 
 
 @dataclass(frozen=True)

@@ -65,8 +65,6 @@ class CollisionCulling:
 
     fastest: float = 2.5
     """Speed at which a geometry may come down on the mean over a window [m/s]."""
-    level: float = 1e-6
-    """By how much the cosine of a floor's slope may lack of 1."""
 
 
 @dataclass(frozen=True)

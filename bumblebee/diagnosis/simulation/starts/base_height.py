@@ -15,17 +15,23 @@ def stance_heights(plant: Plant, rollouts: Sequence[Rollout], ids: Iterable[int]
 
 
 def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
+    assert rollout.base_quat is not None  # the base is floating
+    qpos = np.tile(plant.model.qpos0, (rollout.frames, 1))
+    qpos[:, plant.base_qpos + 3 : plant.base_qpos + 7] = rollout.base_quat
+    qpos[:, plant.qpos] = rollout.joint_pos
+    return heights_of(plant, qpos)
+
+
+def heights_of(plant: Plant, qpos: np.ndarray) -> np.ndarray:
+    """Height of the base (...) [m] at which the lowest point of states (..., nq) touches z = 0, wherever they are."""
     model, data, depth = plant.model, mujoco.MjData(plant.model), plant.thresholds.base_height.rest_depth
     geoms = [g for g in range(model.ngeom) if touches(model, g)]
-    out = np.zeros(rollout.frames)
-    assert rollout.base_quat is not None  # the base is floating
-    for k in range(rollout.frames):
-        data.qpos[:] = model.qpos0
+    out = np.zeros(qpos.shape[:-1])
+    for at in np.ndindex(out.shape):
+        data.qpos[:] = qpos[at]
         data.qpos[plant.base_qpos : plant.base_qpos + 3] = 0.0
-        data.qpos[plant.base_qpos + 3 : plant.base_qpos + 7] = rollout.base_quat[k]
-        data.qpos[plant.qpos] = rollout.joint_pos[k]
         mujoco.mj_kinematics(model, data)
-        out[k] = -min((lowest(model, data, g) for g in geoms), default=0.0) - depth
+        out[at] = -min((lowest(model, data, g) for g in geoms), default=0.0) - depth
     return out
 
 

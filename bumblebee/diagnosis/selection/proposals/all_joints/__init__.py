@@ -21,6 +21,14 @@ from bumblebee.diagnosis.selection.proposals.all_joints.start import (
     begun_with,
     start_far_off,
     start_with_all_joints,
+    whiten_where_it_leans,
 )
 
-__all__ = ["all_joints_of", "begun_with", "fit_all_joints", "start_far_off", "start_with_all_joints"]
+__all__ = [
+    "all_joints_of",
+    "begun_with",
+    "fit_all_joints",
+    "start_far_off",
+    "start_with_all_joints",
+    "whiten_where_it_leans",
+]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bumblebee.diagnosis.candidates import IMU_TILT
 from bumblebee.diagnosis.comparison import Holdout, compare
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
@@ -41,6 +42,14 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     except BadInput:  # it diverges in more than half of the windows
         return problem.relinearised(effects)
     return replace(made, between=problem.between)
+
+
+def whiten_where_it_leans(run: SearchState) -> Asking[bool]:
+    """Whiten anew around a tilt of the base's sensor that was just found: residuals are linear in it from there on."""
+    if run.steps[-1].candidate.effect != IMU_TILT:
+        return False
+    yield Anew(*whitened_anew(run.problem, run.holdout, run.fit))
+    return True
 
 
 def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]:
