@@ -16,11 +16,12 @@ from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.changes import Asking, Loss
-from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints, whiten_where_it_leans
+from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
 from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
 from bumblebee.diagnosis.selection.proposals.gain_grid import start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
+from bumblebee.diagnosis.selection.proposals.leaning_sensor import whiten_where_it_leans
 from bumblebee.diagnosis.selection.proposals.packet_loss import find_packet_loss
 from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
 from bumblebee.diagnosis.selection.rounds import ALL_JOINTS, PROPOSALS, Kept, Round, ask

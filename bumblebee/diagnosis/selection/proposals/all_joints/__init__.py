@@ -21,7 +21,7 @@ from bumblebee.diagnosis.selection.proposals.all_joints.start import (
     begun_with,
     start_far_off,
     start_with_all_joints,
-    whiten_where_it_leans,
+    whitened_anew,
 )
 
 __all__ = [
@@ -30,5 +30,5 @@ __all__ = [
     "fit_all_joints",
     "start_far_off",
     "start_with_all_joints",
-    "whiten_where_it_leans",
+    "whitened_anew",
 ]

@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.comparison import Holdout, compare
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
-from bumblebee.diagnosis.residuals import Problem, angles, make_problem, tilt_of, window_weights
+from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Expecting
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small
@@ -41,24 +41,6 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     except BadInput:  # it diverges in more than half of the windows
         return problem.relinearised(effects)
     return replace(made, between=problem.between)
-
-
-def whiten_where_it_leans(run: SearchState) -> Asking[bool]:
-    """Whiten anew around the tilt of the base's sensor, until it stays; whether it was done.
-
-    Residuals are linear in it by the slopes to noise in the starts, and hold about as far as that noise.
-    """
-    before, done = np.inf, False
-    while before > (away := _leans_away(run)) > 0:
-        before, done = away, True
-        yield Anew(*whitened_anew(run.problem, run.holdout, run.fit))
-    return done
-
-
-def _leans_away(run: SearchState) -> float:
-    """Largest angle between the sensor's tilt and that of the whitening [rad]; 0 within the starts' noise."""
-    away = float(np.abs(angles(tilt_of(run.fit.effects)) - angles(run.problem.tilt)).max())
-    return away if away and away > run.problem.sigma[run.problem.layout.slices["base_rot"]].max() else 0.0
 
 
 def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]:
