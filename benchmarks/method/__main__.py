@@ -55,16 +55,8 @@ def begun(options: argparse.Namespace, method: Method, motions: Motions) -> list
     stamps = sealed_robots(options.robots)
     if stamps:
         freeze(options.out / "robots", method, robots=stamps)
-    shared = [
-        "--settings",
-        options.settings,
-        "--seed",
-        str(options.seed),
-        "--motions",
-        str(options.motions),
-        "--out",
-        str(options.out),
-    ]
+    given = {"settings": options.settings, "seed": options.seed, "motions": options.motions, "out": options.out}
+    shared = [word for name, value in given.items() for word in (f"--{name}", str(value))]
     shared += ["--robots", str(options.robots)] if options.robots else []
     return Plan(options.out, motions.clusters, sorted(stamps), method, tuple(shared)).steps
 

@@ -23,6 +23,8 @@ def beside(runs: Sequence[Path], motions: Motions) -> str:
         BadInput: if a run is of other motions or settings, or nothing in it was tried.
     """
     tried = [_tried(run, motions) for run in runs]
+    if len({stamp for _, stamp in tried}) < len(runs):
+        raise BadInput("runs", "runs of different settings or seeds", "one twice", "Name each once.")
     rows = pd.concat([table for table, _ in tried], ignore_index=True)
     names = {f"{key} {name}": f"{ROWS[key]}, {LEARNERS[name]}" for name in NAMED for key in (BASE, OWN)}
     parts = [f"<!-- methods {' '.join(stamp for _, stamp in tried)}, motions {motions.hash} -->\n"]
@@ -36,7 +38,9 @@ def beside(runs: Sequence[Path], motions: Motions) -> str:
 def _tried(run: Path, motions: Motions) -> tuple[pd.DataFrame, str]:
     """Trials of a run's base policy and of its experts, with learner and seed; the hash of what the run is held to."""
     began = frozen(run)
-    name, seed = began["settings"], began["study"]["seed"]
+    name, seed = began.get("settings"), began["study"].get("seed")
+    if name not in NAMED or seed is None:
+        raise BadInput(run, "a run of `benchmarks.method`", "another's settings", "Name the --out of such a run.")
     method: Method = chosen(name, seed)
     stamp = freeze(run, method, settings=name, motions=motions.hash)
     tables = [(key, read(run, key, "tried", method, motions)) for key in (BASE, OWN)]

@@ -10,7 +10,6 @@ The folder then holds policy.onnx, contract.json, card.json, README.md (the mode
 import argparse
 import os
 import re
-import shutil
 import sys
 from pathlib import Path
 
@@ -37,19 +36,14 @@ def _fetch(options: argparse.Namespace) -> int:
     os.chdir(options.workspace)  # the store is the workspace's
     if options.approved and server:
         raise BadInput("--approved", "a workspace, where answers of people lie", "--server", "Give --workspace.")
-    copied = registry.fetch(named[1], named[2] or named[3], out, server)
-    told = [approved_by(named[1], out)] if options.approved else []
-    print(copied, *told, sep="\n")
+    told: list[str] = []
+
+    def check(files: Path) -> None:
+        if options.approved:
+            told.append(let_through(named[1], files / "policy.onnx", Path.cwd()))
+
+    print(registry.fetch(named[1], named[2] or named[3], out, server, check), *told, sep="\n")
     return 0
-
-
-def approved_by(name: str, folder: Path) -> str:
-    """Who approved a policy that was copied, by this workspace's answers; without an approval the copy goes again."""
-    try:
-        return let_through(name, folder / "policy.onnx", Path.cwd())
-    except BadInput:
-        shutil.rmtree(folder)
-        raise
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:

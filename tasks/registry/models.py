@@ -3,7 +3,7 @@
 import hashlib
 import json
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,7 +102,9 @@ def describe(name: str, text: str) -> None:
 NO_WORKSPACE = "No loop has run there; --workspace takes the folder of one that has: runs/NAME, or the checkout."
 
 
-def fetch(name: str, wanted: str, out: Path, server: str = "") -> Path:
+def fetch(
+    name: str, wanted: str, out: Path, server: str = "", check: Callable[[Path], None] = lambda folder: None
+) -> Path:
     """Copy a version's files from the store of the workspace in this folder, or from a server.
 
     Args:
@@ -110,6 +112,7 @@ def fetch(name: str, wanted: str, out: Path, server: str = "") -> Path:
         wanted: an alias such as "champion", or a version's number.
         out: a folder that is not there yet.
         server: its address; without, no server is needed.
+        check: called with the policy's files before they lie at `out`; what it raises leaves nothing there.
 
     Raises:
         BadInput: where there is no store or server, no such version, or something at `out`.
@@ -133,7 +136,8 @@ def fetch(name: str, wanted: str, out: Path, server: str = "") -> Path:
     out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=out.parent) as made:
         whole = Path(mlflow.artifacts.download_artifacts(f"models:/{name}/{found.version}", dst_path=made))
-        _policy_files(whole).rename(out)
+        check(files := _policy_files(whole))
+        files.rename(out)
     return out
 
 

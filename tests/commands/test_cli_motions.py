@@ -3,6 +3,7 @@
 import csv
 import re
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,19 +14,10 @@ from bumblebee import cli
 from bumblebee.motion.formats.write import write_motion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.robot.facts import joint_names, stand_pose
+from tests.commands.conftest import run as run_command
 from tests.motion.conftest import standing
 
-
-def run(*arguments: object) -> int:
-    """Exit status of `bumblebee motions ARGUMENTS`."""
-    before, sys.argv = sys.argv, ["bumblebee", "motions", *map(str, arguments)]
-    try:
-        cli.main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    finally:
-        sys.argv = before
-    return 0
+run = partial(run_command, "motions")
 
 
 @pytest.fixture

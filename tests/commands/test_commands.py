@@ -8,25 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee import cli
 from bumblebee.commands import table as commands
 from bumblebee.commands.table import COMMANDS, Command
 from flows.cli_settings import _class, keys
 from tasks.settings.params import SECTIONS
+from tests.commands.conftest import run
 
 HOME = Path(__file__).parents[2]
 PAGE = (HOME / "docs" / "commands.md").read_text()
-
-
-def run(*arguments: object) -> int:
-    before, sys.argv = sys.argv, ["bumblebee", *map(str, arguments)]
-    try:
-        cli.main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    finally:
-        sys.argv = before
-    return 0
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -125,16 +125,15 @@ def _looked_at(
     say(f"simulating {config.pool} candidate motions")
     for first in range(0, config.pool, size):
         part = made_safe(surest(stage), motions[first : first + size])
-        seen = first + size
-        each = (time.monotonic() - began) / seen
         safe = safe.and_(part)
         if part.motions:
             logs = ask.logs(part.motions)
             known = known or _unmeasured(stage.machine, logs, config)
             told.append(ask.told(part.motions, known.lens, logs))
-        stop.searching = bool(safe.motions)
-        ahead = each * (size + _rehearsals(stage, config))
-        if seen < config.pool and known and told and stop.before(ahead + _choosing(known, told, config.runs)):
+        stop.searching, seen = bool(safe.motions), first + size
+        each = (time.monotonic() - began) / seen
+        ahead = each * (size + _rehearsals(stage, config)) + _choosing(known, told, config.runs)
+        if seen < config.pool and stop.before(ahead):
             safe.refused[LATE] += config.pool - seen
             break
         if seen < config.pool:
@@ -145,11 +144,13 @@ def _looked_at(
     return safe, np.concatenate(told), known
 
 
-def _choosing(known: _Known, told: Sequence[np.ndarray], runs: int) -> float:
-    """Time [s] that the choice among the candidates takes, by what one look at one of them takes."""
+def _choosing(known: _Known | None, told: Sequence[np.ndarray], runs: int) -> float:
+    """Time [s] that the choice takes, before rehearsals and after them, by what one look at one candidate takes."""
+    if known is None or not told:
+        return 0.0
     began = time.monotonic()
     known.objective.value(known.data + told[0][0])
-    return (time.monotonic() - began) * sum(map(len, told)) * runs * (1 + known.objective.rule.exchanges)
+    return 2 * (time.monotonic() - began) * sum(map(len, told)) * runs * (1 + known.objective.rule.exchanges)
 
 
 def _rehearsals(stage: Stage, config: PlanConfig) -> float:
@@ -266,21 +267,20 @@ def _chosen(
     stage, motions, refused = ask.stage, list(safe.motions), safe.refused.copy()
     tried: dict[int, np.ndarray] = {}  # motion -> the shares (3, J) of the limits that it reaches
     shut: list[int] = []
-    each = 0.0  # seconds of a rehearsal
+    last = 0.0  # seconds of a choice with its rehearsals
     while True:
+        began = time.monotonic()
         picked = choose(known.objective, known.data, told, config.runs, shut)
         if not picked:
             refuse_none(Safe([], safe.reached[:0], refused), say)
         new = [r for r in picked if r not in tried]
         if not new:
             break
-        if tried and stop.before(each * len(new)):
+        if tried and stop.before(last):
             shut += [r for r in range(len(motions)) if r not in {*tried, *shut}]
             continue
         say(f"rehearsing {len(new)} runs on each of {len(stage.cases)} robots")
-        began = time.monotonic()
         proof = proven(stage, [motions[r] for r in new])
-        each = (time.monotonic() - began) / len(new)
         refused += proof.refused
         found = {m.number: (m, reached) for m, reached in zip(proof.motions, proof.reached, strict=True)}
         shut += [r for r in new if motions[r].number not in found]
@@ -291,6 +291,7 @@ def _chosen(
         if smaller:
             again = [motions[r] for r in smaller]
             told[smaller] = ask.told(again, known.lens, ask.logs(again))
+        last = time.monotonic() - began
     return Plan(
         stage.machine, stage.limits, config, findings, stage.cases, [motions[r] for r in picked],
         np.stack([tried[r] for r in picked]), known.objective, known.data, told[picked], dict(refused),

@@ -14,7 +14,7 @@ from bumblebee.diagnosis.plan.limits import limits_of
 from bumblebee.diagnosis.plan.machine import Machine, make_machine, without_gains
 from bumblebee.diagnosis.plan.motions import FAMILIES, Motion, Scope, draw_motion
 from bumblebee.diagnosis.plan.rehearsal import rehearse, settled
-from bumblebee.diagnosis.plan.safety import Safe, judge, made_safe
+from bumblebee.diagnosis.plan.safety import LATE, Safe, judge, made_safe
 from bumblebee.diagnosis.plan.stage import Stage
 from bumblebee.diagnosis.plan.unknowns import Case, cases_of
 from bumblebee.errors import BadInput
@@ -93,7 +93,8 @@ def refuse_none(safe: Safe, say: Callable[[str], None]) -> None:
         say(f"{count} motions discarded: {reason}")
     if not safe.motions:
         reason, count = safe.refused.most_common(1)[0]
-        raise BadInput("plan", "a motion within all limits", f"none; {count} of them: {reason}", "Widen that limit.")
+        do = "Give more --minutes, or widen a limit." if reason == LATE else "Widen that limit."
+        raise BadInput("plan", "a motion within all limits", f"none; {count} of them: {reason}", do)
 
 
 def refuse_fallen(machine: Machine, start: Surroundings) -> None:

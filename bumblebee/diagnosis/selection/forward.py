@@ -175,7 +175,7 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         accepted = attempt(name, partial(run.accept, best.candidate, best.values), partial(run.refuse, best.candidate))
         vain = 0 if accepted else vain + 1
         if accepted:
-            attempt("the tilt of the base's sensor", partial(go, run, whiten_where_it_leans), _no)
+            attempt("the tilt of the base's sensor", partial(go, run, whiten_where_it_leans), lambda: None)
             attempt("a torque limit in the place of a weak drive", partial(go, run, swap_limits), _no)
             run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
 

@@ -62,3 +62,14 @@ def test_a_run_of_other_motions_or_without_trials_is_one_line(
     with pytest.raises(BadInput, match="trials of the base policy, came none"):
         command.write_beside(command.parse([*given, str(folder)]))
     assert not (folder / "t.md").exists()
+
+
+def test_one_run_twice_and_the_run_of_another_benchmark_are_one_line(folder: Path) -> None:
+    run = tried(folder, "ppo", 0, [True] * 6)
+    given = ["--motions", str(folder), "--out", str(folder / "t.md")]
+    with pytest.raises(BadInput, match="runs: expected runs of different settings or seeds"):
+        command.write_beside(command.parse(["beside", str(run), str(run), *given]))
+    freeze(folder / "study", chosen("ppo", 0), motions="m")
+    with pytest.raises(BadInput, match=r"a run of `benchmarks\.method`"):
+        command.write_beside(command.parse(["beside", str(folder / "study"), *given]))
+    assert not (folder / "t.md").exists()

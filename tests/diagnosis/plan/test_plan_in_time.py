@@ -1,5 +1,6 @@
 """A plan in some minutes: chosen among the candidates that were looked at, and safe all the same."""
 
+from collections import Counter
 from dataclasses import replace
 
 import mujoco
@@ -10,8 +11,10 @@ from bumblebee.diagnosis.plan import Plan, findings_of, make_plan
 from bumblebee.diagnosis.plan import plan as planning
 from bumblebee.diagnosis.plan.motions import FAMILIES
 from bumblebee.diagnosis.plan.safety import LATE, Safe
+from bumblebee.diagnosis.plan.stage import Stage
 from bumblebee.diagnosis.plan.written.document import notes
 from bumblebee.diagnosis.simulation import Stop
+from bumblebee.errors import BadInput
 from tests.diagnosis.arm import XML
 from tests.diagnosis.plan.made import LIMITS, friction, slow_session
 
@@ -66,3 +69,16 @@ def test_once_the_time_is_over_only_what_was_rehearsed_is_chosen(monkeypatch: py
     plan = plan_until(stop)
     assert {m.number for m in plan.motions} <= set(rehearsed) and len(rehearsed) == LIMITS.runs
     assert len(plan.motions) == LIMITS.runs - 1 and np.isfinite(plan.runs).all()
+
+
+def test_where_nothing_was_safe_when_the_time_was_over_it_ends_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def none_is(stage: Stage, motions: list) -> Safe:
+        seen.append(len(motions))
+        return Safe([], np.zeros((0, 3, 3)), Counter({"j1 leaves its range": len(motions)}))
+
+    monkeypatch.setattr(planning, "made_safe", none_is)
+    with pytest.raises(BadInput, match=r"none; \d+ of them: not looked at: the time was over. Give more --minutes"):
+        plan_until(Stop(minutes=1e-6))
+    assert seen == [len(FAMILIES)]

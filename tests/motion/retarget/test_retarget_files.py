@@ -2,13 +2,12 @@
 
 import csv
 import io
-import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from bumblebee import cli
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.read import RobotConfig
 from bumblebee.motion.formats.read import read_robot as read_again
@@ -17,6 +16,7 @@ from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.retarget.mapping import read_robot
 from bumblebee.motion.retarget_files import RobotFiles, _cell, _Job, _made
 from bumblebee.robot.facts import joint_names, stand_pose
+from tests.commands.conftest import run as run_command
 from tests.motion.human.people import bvh
 from tests.motion.retarget.robots import H1
 from tests.motion.retarget.stepping import steps
@@ -24,16 +24,7 @@ from tests.motion.retarget.stepping import steps
 ROBOT = ("--model", H1 / "h1.xml", "--mapping", H1 / "h1.yaml")
 
 
-def run(*arguments: object) -> int:
-    """Exit status of `bumblebee motions retarget ARGUMENTS`."""
-    before, sys.argv = sys.argv, ["bumblebee", "motions", "retarget", *map(str, arguments)]
-    try:
-        cli.main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    finally:
-        sys.argv = before
-    return 0
+run = partial(run_command, "motions", "retarget")
 
 
 @pytest.fixture

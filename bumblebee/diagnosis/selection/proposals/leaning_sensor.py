@@ -8,16 +8,15 @@ from bumblebee.diagnosis.selection.proposals.all_joints import whitened_anew
 from bumblebee.diagnosis.selection.state import SearchState
 
 
-def whiten_where_it_leans(run: SearchState) -> Asking[bool]:
-    """Whiten anew around the tilt of the base's sensor, until it stays; whether it was done.
+def whiten_where_it_leans(run: SearchState) -> Asking[None]:
+    """Whiten anew around the tilt of the base's sensor, until it stays.
 
     Residuals are linear in it by the slopes to noise in the starts, and hold about as far as that noise.
     """
-    before, done = np.inf, False
+    before = np.inf
     while before > (away := _leans_away(run)) > 0:
-        before, done = away, True
+        before = away
         yield Anew(*whitened_anew(run.problem, run.holdout, run.fit))
-    return done
 
 
 def _leans_away(run: SearchState) -> float:
