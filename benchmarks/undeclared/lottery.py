@@ -13,7 +13,7 @@ import numpy as np
 
 from bumblebee.stand_in.undeclared.kinds import CATALOGUE, KINDS, LATER, OUTSIDE, fits
 
-VERSION = 8  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
+VERSION = 9  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
 
 
 @dataclass(frozen=True)

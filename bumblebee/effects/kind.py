@@ -85,6 +85,8 @@ class Kind:
     """A parameter that makes of it, where it is not zero, a form that MJCF does not carry."""
     structural: bool = False
     """Whether it changes the layout of MuJoCo's state, or the geometry."""
+    stateless: bool = False
+    """Whether a structural one has no state, so that nothing of it must be guessed where a window starts."""
     constants: bool = False
     """Whether MuJoCo must work out its constants anew when it is written, as after all that is structural."""
     absent: float | tuple[float, ...] | None = None
@@ -100,6 +102,8 @@ class Kind:
     column: Literal["torque", "late", "simulated"] = "torque"
     """Where its sensitivity comes from: from a torque on the robot; from one to first order, which is poor for light
     joints of stiff servos; or from simulation alone, for no torque stands for it."""
+    on_two_joints: bool = False
+    """Whether its torque is on another joint as well: `torque` then gets `Signatures`, as of what sits on a body."""
     fine_steps: bool = False
     """Whether coarse steps would falsify it: they hit a backlash too softly and a limit too late, let feet touch
     otherwise, and late feedback, computed beside the integrator, moves a servo by itself. A tilt is not simulated."""

@@ -77,6 +77,8 @@ class OnJoint:
     """A joint with typical sizes of its data."""
 
     spot: Spot
+    before: str
+    """The joint before it on its chain, if that has a drive and moves; else ""."""
     rules: Any
     """`diagnosis.thresholds.candidates.CandidateThresholds`."""
     torque: float

@@ -11,6 +11,7 @@ from bumblebee.diagnosis.candidates.signal_scales import Scales, scales_of
 from bumblebee.diagnosis.candidates.surfaces import surface_candidates
 from bumblebee.diagnosis.simulation import Plant, declared_values, spot
 from bumblebee.diagnosis.thresholds.candidates import BodySteps, CandidateThresholds, StillJoints
+from bumblebee.effects.coupled import joint_before
 from bumblebee.effects.native import touching
 from bumblebee.effects.places import OnBody, OnJoint, OnRobot, Step
 from bumblebee.measured.rollout import Rollout
@@ -44,7 +45,7 @@ def all_candidates(
     found: list[Candidate] = []
     for j, name in enumerate(plant.joints):
         if name not in still:
-            found += _made(plant, _fitting(plant, j), name, _on_joint(plant, scales, j, rules))
+            found += _made(plant, _fitting(plant, j), name, _on_joint(plant, scales, j, still, rules))
     found += _on_whole(plant, rules)
     for body in bodies:
         found += _made(plant, _sitting("body"), body, OnBody(spot(plant, body), rules.body))
@@ -77,9 +78,12 @@ def _fitting(plant: Plant, j: int) -> list[Kind]:
     return [kind for kind in _sitting("joint") if has[kind.drive]]
 
 
-def _on_joint(plant: Plant, scales: Scales, j: int, rules: CandidateThresholds) -> OnJoint:
+def _on_joint(plant: Plant, scales: Scales, j: int, still: Sequence[str], rules: CandidateThresholds) -> OnJoint:
+    before = joint_before(plant.model, plant.joints[j])
+    moved = before in plant.joints and before not in still and plant.actuator[plant.joints.index(before)] >= 0
     return OnJoint(
         spot(plant, plant.joints[j]),
+        before if moved else "",
         rules,
         torque=rules.joint.torque * scales.torque[j],
         peak=scales.peak[j],

@@ -42,7 +42,8 @@ class Signatures:
         self.supply = np.atleast_1d(self.servos.supply)[..., 0]
         self.u = self.servos.controls(path.control)
         self.torque = self.servos.torque(self.q, self.v, self.u)
-        self.sign = np.tanh(self.v / rule.creep)
+        self._creep = rule.creep
+        self.sign = self.direction(self.v)
         memory = remember(plant, windows, runtime_hooks([], plant.model), path.step)
         order = [runtime_hooks([], plant.model).joints.index(name) for name in plant.joints]
         clock = memory.time[:, None] + path.step * np.arange(self.q.shape[1])
@@ -55,7 +56,7 @@ class Signatures:
     def of(self, candidate: Candidate) -> np.ndarray:
         """Torques (F, W, S, nv) for one step of each of the F free parameters."""
         kind = CATALOGUE[candidate.effect]
-        if kind.on != "joint":
+        if kind.on != "joint" or kind.on_two_joints:
             return np.asarray(kind.torque(self, candidate))
         joints = self.plant.joints
         columns = [joints.index(candidate.where)] if candidate.where else list(range(len(joints)))
@@ -65,6 +66,10 @@ class Signatures:
             for f, torque in enumerate(torques):
                 out[f, :, :, self.plant.dof[j]] += self.path.mean(torque)
         return out
+
+    def direction(self, speed: np.ndarray) -> np.ndarray:
+        """Sign of speeds [rad/s], smooth at rest."""
+        return np.tanh(speed / self._creep)
 
     def inertial(self, free: Sequence[int], move: Callable[[mujoco.MjModel, int], None]) -> np.ndarray:
         """Less inverse dynamics (F, W, S, nv) with a parameter of `free` moved in a model than without."""

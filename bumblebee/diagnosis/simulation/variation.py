@@ -23,8 +23,6 @@ from bumblebee.sim.effects import (
     runtime_hooks,
 )
 
-_NO_STATE = ("surface_contact",)
-
 
 @dataclass(frozen=True, eq=False)
 class Variation:
@@ -67,7 +65,7 @@ class Variation:
     @property
     def plain(self) -> bool:
         """Whether a model and what becomes of single commands on their way are all there is to it."""
-        seen = all(kind in _NO_STATE for kind, _, _ in self.hidden)
+        seen = all(CATALOGUE[kind].stateless for kind, _, _ in self.hidden)
         alone = seen and self.hooks is None and self.tilt is None and self.dropped is None
         return alone and not self.impossible
 

@@ -28,7 +28,7 @@ class SurfaceContact(Kind):
         *(Parameter(axis, "m", -2.0, 2.0) for axis in "xyz"),
         Parameter("friction", "", 0.0, 5.0, 1.0, matters=0.1),
     )
-    structural = True
+    structural = stateless = True
     experiment = "repeat the motion with the robot lifted off what it may touch, or with that taken away"
     column = "simulated"
     abrupt = judged_alone = True

@@ -31,6 +31,10 @@ class Declared:
     mass: dict[str, float]
     """Body -> [kg]."""
     floating: bool
+    chained: dict[str, str]
+    """Joint -> the hinge before it, for those that have one."""
+    crossed: tuple[str, ...]
+    """Those of them whose axis is not parallel to that one's."""
 
 
 def describe(name: str, spec: mujoco.MjSpec) -> Declared:
@@ -40,6 +44,10 @@ def describe(name: str, spec: mujoco.MjSpec) -> Declared:
     dofs = model.jnt_dofadr[hinges]
     servo = {int(model.actuator_trnid[a, 0]): a for a in range(model.nu)}
     rows = [servo[j] for j in hinges]
+    names = {j: model.joint(j).name for j in hinges}
+    before = {j: found for j in hinges if (found := _hinge_before(model, j)) is not None}
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     moving = [b for b in range(1, model.nbody) if model.body_weldid[b] and model.body_mass[b] > 0]
     return Declared(
         name=name,
@@ -54,4 +62,18 @@ def describe(name: str, spec: mujoco.MjSpec) -> Declared:
         damping=model.dof_damping[dofs].copy(),
         mass={model.body(b).name: float(model.body_mass[b]) for b in moving},
         floating=int(mujoco.mjtJoint.mjJNT_FREE) in model.jnt_type,
+        chained={names[j]: names[other] for j, other in before.items()},
+        crossed=tuple(names[j] for j, other in before.items() if abs(data.xaxis[j] @ data.xaxis[other]) < 0.9),
     )
+
+
+def _hinge_before(model: mujoco.MjModel, joint: int) -> int | None:
+    """The last hinge on the way from the base to a joint of one of its own."""
+    body = int(model.jnt_bodyid[joint])
+    if joint > model.body_jntadr[body]:
+        return joint - 1
+    while body := int(model.body_parentid[body]):
+        if model.body_jntnum[body]:
+            last = int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
+            return last if model.jnt_type[last] == int(mujoco.mjtJoint.mjJNT_HINGE) else None
+    return None

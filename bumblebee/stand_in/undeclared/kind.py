@@ -50,7 +50,7 @@ class Kind:
 
     name: str
     on: str
-    """joint, body, base, hand, whole."""
+    """joint, pair (a joint with another before it), crossed (these not about parallel axes), body, base, whole."""
     make: Callable[[Place, float], Made]
     first: Callable[[Place], float]
     """A small size to begin the search for the detectable one with."""
@@ -88,6 +88,8 @@ def places(kind: Kind, robot: Declared) -> tuple[str, ...]:
     """Names where a kind can sit; ("",) where it has the whole robot or its base."""
     if kind.on == "joint":
         return robot.joints
+    if kind.on in ("pair", "crossed"):
+        return tuple(robot.chained) if kind.on == "pair" else robot.crossed
     if kind.on == "body":
         return tuple(b for b in robot.bodies if robot.mass[b] >= 0.25)
     return robot.bodies[:1] if kind.on == "base" and robot.floating else ("",)

@@ -1,0 +1,117 @@
+"""Motors that turn with two joints, as in the wrists of industrial arms and the ankles and waists of humanoids.
+
+In MJCF they are fixed tendons, whose length is an angle of the motor: the sum, or the difference, of a joint's angle
+and `ratio` times that of the joint before it on its chain. MuJoCo gives a tendon friction, damping and inertia.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bumblebee.effects.hinges import joint_of
+from bumblebee.effects.kind import INF, Kind, Parameter
+from bumblebee.effects.law import OF_ONE_JOINT
+from bumblebee.effects.native import is_hidden
+from bumblebee.effects.places import OnJoint, Spot, Step
+from bumblebee.errors import BadInput
+
+WAYS = {"sum": 1.0, "difference": -1.0}
+_OF_ONE_ANGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+
+
+def coupled(unit: str) -> tuple[Parameter, ...]:
+    """Parameters of an effect on both motors: of the one that turns with the sum, of the other, and their ratio."""
+    sizes = (Parameter(way, unit, 0.0, INF) for way in WAYS)
+    return (*sizes, Parameter("ratio", "", 0.05, 20.0, 1.0, matters=0.1))
+
+
+class Coupled(Kind):
+    """An effect of motors that turn with a joint and the one before it."""
+
+    absent = 0.0
+    structural = stateless = on_two_joints = True
+    drive = "any"
+    law = OF_ONE_JOINT
+    not_undone = "it is a torque on two joints at once, and what is sent is made joint by joint"
+
+    def add(self, spec: mujoco.MjSpec, place: str, *values: float) -> None:
+        *sizes, ratio = values
+        before = _before_in(spec, place)
+        for (way, sign), size in zip(WAYS.items(), sizes, strict=True):
+            tendon = spec.add_tendon(name=self._tendon(place, way))
+            tendon.wrap_joint(before, sign * ratio)
+            tendon.wrap_joint(place, 1.0)
+            self.give(tendon, size)
+
+    def write(self, spot: Spot, *values: float) -> None:
+        *sizes, ratio = values
+        for (way, sign), size in zip(WAYS.items(), sizes, strict=True):
+            tendon = spot.model.tendon(self._tendon(spot.place, way)).id
+            self.sizes(spot.model)[tendon] = size
+            spot.model.wrap_prm[spot.model.tendon_adr[tendon]] = sign * ratio
+
+    def steps(self, on: OnJoint) -> Iterator[Step]:
+        if on.before:
+            size = self.size(on)
+            yield Step((size, size, 1.0), free=(0, 1), start=(0.0, 0.0, 0.0), shape=1.0)
+
+    def give(self, tendon: Any, size: float) -> None:
+        """Give it to a tendon of a spec."""
+        raise NotImplementedError
+
+    def sizes(self, model: mujoco.MjModel) -> np.ndarray:
+        """Its sizes on a model's tendons."""
+        raise NotImplementedError
+
+    def size(self, on: OnJoint) -> float:
+        """A first step of what either motor has."""
+        raise NotImplementedError
+
+    def felt(self, along: Any, j: int) -> np.ndarray:
+        """(W, K) what of a joint's motion it answers to."""
+        return along.v[..., j]
+
+    def answer(self, along: Any, motion: np.ndarray) -> np.ndarray:
+        """Torque (W, K) of a size of 1 on a motor that moves so."""
+        return -motion
+
+    def torque(self, along: Any, c: Any) -> np.ndarray:
+        joints = along.plant.joints
+        j, before = joints.index(c.where), joints.index(joint_before(along.plant.model, c.where))
+        out = []
+        for f, sign in zip(c.free, WAYS.values(), strict=True):
+            ratio = sign * c.start[-1]
+            given = c.step[f] * along.path.mean(
+                self.answer(along, self.felt(along, j) + ratio * self.felt(along, before))
+            )
+            torque = np.zeros((*given.shape, along.plant.model.nv))
+            torque[..., along.plant.dof[j]], torque[..., along.plant.dof[before]] = given, ratio * given
+            out.append(torque)
+        return np.stack(out)
+
+    def _tendon(self, joint: str, way: str) -> str:
+        return f"{joint}_{self.id}_{way}"
+
+
+def joint_before(model: mujoco.MjModel, name: str) -> str:
+    """The hinge or slide before a joint on its chain: on its body, or on the nearest one that carries it; "": none."""
+    joint = model.joint(name).id
+    body = int(model.jnt_bodyid[joint])
+    while body:
+        first = int(model.body_jntadr[body])
+        for other in range(min(joint, first + int(model.body_jntnum[body])) - 1, first - 1, -1):
+            found = model.joint(other).name
+            if not is_hidden(found):
+                return found if model.jnt_type[other] in _OF_ONE_ANGLE else ""
+        body = int(model.body_parentid[body])
+    return ""
+
+
+def _before_in(spec: mujoco.MjSpec, name: str) -> str:
+    """`joint_before` of a spec; `BadInput` where there is none."""
+    joint_of(spec, name)
+    if not (before := joint_before(spec.compile(), name)):
+        raise BadInput(f"effect on joint {name!r}", "a joint with another one before it on its chain", "none before it")
+    return before
