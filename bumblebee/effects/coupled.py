@@ -4,7 +4,7 @@ In MJCF they are fixed tendons, whose length is an angle of the motor: the sum, 
 and `ratio` times that of the joint before it on its chain. MuJoCo gives a tendon friction, damping and inertia.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import mujoco
@@ -37,6 +37,7 @@ class Coupled(Kind):
     not_undone = "it is a torque on two joints at once, and what is sent is made joint by joint"
 
     def add(self, spec: mujoco.MjSpec, place: str, *values: float) -> None:
+        """Two fixed tendons along both joints."""
         *sizes, ratio = values
         before = _before_in(spec, place)
         for (way, sign), size in zip(WAYS.items(), sizes, strict=True):
@@ -46,6 +47,7 @@ class Coupled(Kind):
             self.give(tendon, size)
 
     def write(self, spot: Spot, *values: float) -> None:
+        """Sizes and ratio of these tendons."""
         *sizes, ratio = values
         for (way, sign), size in zip(WAYS.items(), sizes, strict=True):
             tendon = spot.model.tendon(self._tendon(spot.place, way)).id
@@ -53,6 +55,7 @@ class Coupled(Kind):
             spot.model.wrap_prm[spot.model.tendon_adr[tendon]] = sign * ratio
 
     def steps(self, on: OnJoint) -> Iterator[Step]:
+        """Both motors at once, of one ratio, where a driven joint that moves lies before it."""
         if on.before:
             size = self.size(on)
             yield Step((size, size, 1.0), free=(0, 1), start=(0.0, 0.0, 0.0), shape=1.0)
@@ -78,6 +81,7 @@ class Coupled(Kind):
         return -motion
 
     def torque(self, along: Any, c: Any) -> np.ndarray:
+        """Torques (F, W, S, nv) of each motor on both joints, from `Signatures`."""
         joints = along.plant.joints
         j, before = joints.index(c.where), joints.index(joint_before(along.plant.model, c.where))
         out = []

@@ -81,6 +81,8 @@ class ColumnMap:
     """Column of the contract -> factors, one a joint, on its values (in rad where they are angles)."""
     offset: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Column of the contract -> offsets, one a joint, added after the factors."""
+    transmission: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Joint -> factors of the motors in whose place joints stand, after scale and offset; see `transmission.py`."""
     meta: dict[str, Any] = field(default_factory=dict)
     """robot, kp, kd, notes and other metadata of the contract."""
 

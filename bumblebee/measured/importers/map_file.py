@@ -19,6 +19,7 @@ from bumblebee.measured.importers.column_map import (
     UNCOMMANDED,
     ColumnMap,
 )
+from bumblebee.measured.importers.transmission import read_transmission, refuse_gains
 from bumblebee.measured.importers.unitree import UNITREE
 
 _STATE = "It is not guessed: state it."
@@ -68,6 +69,7 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     given["names"] = _renamed(f"{path}: names", table.get("names"), joints)
     given["locked"] = _names(f"{path}: locked", table["locked"]) if table.get("locked") else ()
     given["order"] = _orders(f"{path}: order", table.get("order"))
+    given["transmission"] = read_transmission(f"{path}: transmission", table.get("transmission"), joints)
     given["meta"] = _meta(f"{path}: meta", table.get("meta", {}))
     given |= {key: _linear(f"{path}: {key}", table.get(key), len(joints)) for key in ("scale", "offset")}
     if any(factor == 0 for factors in given["scale"].values() for factor in factors):
@@ -77,6 +79,7 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     chosen = ColumnMap(**(given | choices))
     _require_scales(path, chosen)
     _require_components(path, chosen)
+    refuse_gains(str(path), chosen)
     return chosen
 
 

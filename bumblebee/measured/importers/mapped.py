@@ -9,6 +9,7 @@ from bumblebee.measured.importers.clock import require_clock, takes
 from bumblebee.measured.importers.column_map import ANGLE_FACTORS, LEFT_OUT, NAMED, ColumnMap
 from bumblebee.measured.importers.drive import Stretch, stretches
 from bumblebee.measured.importers.source import NO_VELOCITY, differences, measured_rate
+from bumblebee.measured.importers.transmission import through
 from bumblebee.measured.pauses import SHORTEST
 from bumblebee.measured.rollout import COMMANDS, WIDTHS, Rollout
 
@@ -44,7 +45,7 @@ def rollouts_of(
             raise BadInput(f"{where}: episodes", f"takes of {SHORTEST:g} s or more", "none")
         short = len(time) - sum(part.stop - part.start for part in rows)
         notes = (*notes, *[f"{short} rows of takes shorter than {SHORTEST:g} s left out"] * bool(short))
-    turned = {column: _turned(column, value, chosen) for column, value in values.items()}
+    turned = through({column: _turned(column, value, chosen) for column, value in values.items()}, chosen)
     keep = [place for place, joint in enumerate(chosen.joints) if joint != LEFT_OUT]
     if len(keep) < len(chosen.joints):
         turned = {c: value[:, keep] if NAMED[c] == "J" else value for c, value in turned.items()}

@@ -69,8 +69,9 @@ def _require_commands(path: Path, chosen: ColumnMap, model: mujoco.MjModel | Non
 def _require_units(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:
     """A map that states no unit has the contract's, rad and m."""
     units = chosen.angle_unit * (len(chosen.joints) if len(chosen.angle_unit) == 1 else 1)
+    turned = {motor for row in chosen.transmission.values() for motor in row}  # a motor's unit, not a joint's
     for joint, unit in zip(chosen.joints, units, strict=False):
-        if joint == LEFT_OUT:
+        if joint == LEFT_OUT or joint in turned:
             continue
         slide = int(model.joint(joint).type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
         if slide and unit in _TURNED:
