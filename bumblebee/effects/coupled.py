@@ -1,7 +1,9 @@
 """Motors that turn with two joints, as in the wrists of industrial arms and the ankles and waists of humanoids.
 
-In MJCF they are fixed tendons, whose length is an angle of the motor: the sum, or the difference, of a joint's angle
-and `ratio` times that of the joint before it on its chain. MuJoCo gives a tendon friction, damping and inertia.
+In MJCF they are fixed tendons, whose length is an angle of the motor: a joint's angle and `ratio` times that of the
+joint before it on its chain, which is less than 0 where it turns with their difference. MuJoCo gives a tendon friction,
+damping and inertia. Of what is linear in the motion, motors of the sum and of the difference together are no more than
+the joints' own beside one of the two; of dry friction they are.
 """
 
 from collections.abc import Iterator
@@ -11,54 +13,55 @@ import mujoco
 import numpy as np
 
 from bumblebee.effects.hinges import joint_of
-from bumblebee.effects.kind import INF, Kind, Parameter
+from bumblebee.effects.kind import Kind, Parameter
 from bumblebee.effects.law import OF_ONE_JOINT
 from bumblebee.effects.native import is_hidden
 from bumblebee.effects.places import OnJoint, Spot, Step
 from bumblebee.errors import BadInput
 
-WAYS = {"sum": 1.0, "difference": -1.0}
 _OF_ONE_ANGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 
-def coupled(unit: str) -> tuple[Parameter, ...]:
-    """Parameters of an effect on both motors: of the one that turns with the sum, of the other, and their ratio."""
-    sizes = (Parameter(way, unit, 0.0, INF) for way in WAYS)
-    return (*sizes, Parameter("ratio", "", 0.05, 20.0, 1.0, matters=0.1))
+def ratio(least: float) -> Parameter:
+    """How far a motor turns with the joint before, of how far with its own."""
+    return Parameter("ratio", "", least, 20.0, 1.0, matters=0.1)
 
 
 class Coupled(Kind):
     """An effect of motors that turn with a joint and the one before it."""
 
+    ways: tuple[float, ...] = (1.0,)
+    """Sign of the ratio, of each motor."""
     absent = 0.0
-    structural = stateless = on_two_joints = True
+    structural = stateless = on_two_joints = standard = True
     drive = "any"
     law = OF_ONE_JOINT
     not_undone = "it is a torque on two joints at once, and what is sent is made joint by joint"
 
     def add(self, spec: mujoco.MjSpec, place: str, *values: float) -> None:
-        """Two fixed tendons along both joints."""
+        """A fixed tendon along both joints for each motor."""
         *sizes, ratio = values
         before = _before_in(spec, place)
-        for (way, sign), size in zip(WAYS.items(), sizes, strict=True):
+        for way, size in zip(self.ways, sizes, strict=True):
             tendon = spec.add_tendon(name=self._tendon(place, way))
-            tendon.wrap_joint(before, sign * ratio)
+            tendon.wrap_joint(before, way * ratio)
             tendon.wrap_joint(place, 1.0)
             self.give(tendon, size)
 
     def write(self, spot: Spot, *values: float) -> None:
         """Sizes and ratio of these tendons."""
         *sizes, ratio = values
-        for (way, sign), size in zip(WAYS.items(), sizes, strict=True):
+        for way, size in zip(self.ways, sizes, strict=True):
             tendon = spot.model.tendon(self._tendon(spot.place, way)).id
             self.sizes(spot.model)[tendon] = size
-            spot.model.wrap_prm[spot.model.tendon_adr[tendon]] = sign * ratio
+            spot.model.wrap_prm[spot.model.tendon_adr[tendon]] = way * ratio
 
     def steps(self, on: OnJoint) -> Iterator[Step]:
-        """Both motors at once, of one ratio, where a driven joint that moves lies before it."""
-        if on.before:
-            size = self.size(on)
-            yield Step((size, size, 1.0), free=(0, 1), start=(0.0, 0.0, 0.0), shape=1.0)
+        """Both motors at once, or one for the sum and one for the difference, after a driven joint that moves."""
+        motors = len(self.ways)
+        for sign in (1.0, -1.0) if on.before and motors == 1 else (1.0,) * bool(on.before):
+            sizes = (self.size(on),) * motors
+            yield Step((*sizes, sign), free=tuple(range(motors)), start=(0.0,) * (motors + 1), shape=1.0)
 
     def give(self, tendon: Any, size: float) -> None:
         """Give it to a tendon of a spec."""
@@ -85,8 +88,8 @@ class Coupled(Kind):
         joints = along.plant.joints
         j, before = joints.index(c.where), joints.index(joint_before(along.plant.model, c.where))
         out = []
-        for f, sign in zip(c.free, WAYS.values(), strict=True):
-            ratio = sign * c.start[-1]
+        for f, way in zip(c.free, self.ways, strict=True):
+            ratio = way * c.start[-1]
             given = c.step[f] * along.path.mean(
                 self.answer(along, self.felt(along, j) + ratio * self.felt(along, before))
             )
@@ -95,8 +98,8 @@ class Coupled(Kind):
             out.append(torque)
         return np.stack(out)
 
-    def _tendon(self, joint: str, way: str) -> str:
-        return f"{joint}_{self.id}_{way}"
+    def _tendon(self, joint: str, way: float) -> str:
+        return f"{joint}_{self.id}" + "_difference" * (way < 0)
 
 
 def joint_before(model: mujoco.MjModel, name: str) -> str:

@@ -104,6 +104,8 @@ class Kind:
     joints of stiff servos; or from simulation alone, for no torque stands for it."""
     on_two_joints: bool = False
     """Whether its torque is on another joint as well: `torque` then gets `Signatures`, as of what sits on a body."""
+    standard: bool = False
+    """Whether it is a standard parameter of a robot's dynamics: its torque is its size times what the motion says."""
     fine_steps: bool = False
     """Whether coarse steps would falsify it: they hit a backlash too softly and a limit too late, let feet touch
     otherwise, and late feedback, computed beside the integrator, moves a servo by itself. A tilt is not simulated."""

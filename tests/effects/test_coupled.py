@@ -33,9 +33,10 @@ def by_mujoco(effect: str, *values: float) -> np.ndarray:
     return np.array(path)
 
 
-def by_hand(effect: str, total: float, difference: float, ratio: float) -> np.ndarray:
-    """Semi-implicit Euler of both rotors, with the torque or the inertia along both motors' angles."""
-    ways, sizes = np.array([[ratio, 1.0], [-ratio, 1.0]]), (total, difference)
+def by_hand(effect: str, *values: float) -> np.ndarray:
+    """Semi-implicit Euler of both rotors, with the torque or the inertia along the motors' angles."""
+    *sizes, ratio = values
+    ways = np.array([[ratio, 1.0], [-ratio, 1.0]])[: len(sizes)]
     mass, q, v, path = np.diag(INERTIAS), np.zeros(2), np.zeros(2), []
     if effect == "coupled_armature":
         mass = mass + sum(size * np.outer(way, way) for size, way in zip(sizes, ways, strict=True))
@@ -56,14 +57,14 @@ def by_hand(effect: str, total: float, difference: float, ratio: float) -> np.nd
     [
         ("coupled_friction", (0.06, 0.0, 1.0), 0.01),
         ("coupled_friction", (0.02, 0.05, 0.7), 0.01),
-        ("coupled_damping", (0.2, 0.0, 1.0), 1e-3),
-        ("coupled_damping", (0.05, 0.3, 1.5), 1e-3),
-        ("coupled_armature", (0.03, 0.0, 1.0), 1e-3),
-        ("coupled_armature", (0.01, 0.04, 0.6), 1e-3),
+        ("coupled_damping", (0.2, 1.0), 1e-3),
+        ("coupled_damping", (0.3, -1.5), 1e-3),
+        ("coupled_armature", (0.03, 1.0), 1e-3),
+        ("coupled_armature", (0.04, -0.6), 1e-3),
     ],
 )
-def test_both_motors_follow_their_equation(effect: str, values: tuple[float, float, float], near: float) -> None:
-    expected, plain = by_hand(effect, *values), by_hand("none", 0.0, 0.0, 1.0)
+def test_both_motors_follow_their_equation(effect: str, values: tuple[float, ...], near: float) -> None:
+    expected, plain = by_hand(effect, *values), by_hand("none", 1.0)
     moved = np.abs(expected - plain).max()
     assert moved > 0.05
     assert np.abs(by_mujoco(effect, *values) - expected).max() < near * np.abs(expected).max()
@@ -77,4 +78,4 @@ def test_the_joint_before_is_the_next_one_towards_the_base() -> None:
 
 def test_a_joint_with_none_before_it_is_refused() -> None:
     with pytest.raises(BadInput, match="a joint with another one before it"):
-        add_to_spec(mujoco.MjSpec.from_string(XML), [single("coupled_damping", "pitch", 0.1, 0.0, 1.0)])
+        add_to_spec(mujoco.MjSpec.from_string(XML), [single("coupled_damping", "pitch", 0.1, 1.0)])

@@ -73,12 +73,12 @@ class Signatures:
 
     def inertial(self, free: Sequence[int], move: Callable[[mujoco.MjModel, int], None]) -> np.ndarray:
         """Less inverse dynamics (F, W, S, nv) with a parameter of `free` moved in a model than without."""
-        base = self._inverse_dynamics(self.plant.model)
+        base = self.inverse_dynamics(self.plant.model)
         out = []
         for f in free:
             model = copy.copy(self.plant.model)
             move(model, f)
-            out.append(base - self._inverse_dynamics(model))
+            out.append(base - self.inverse_dynamics(model))
         return np.stack(out)
 
     def jacobians(self, body: str) -> np.ndarray:
@@ -127,11 +127,11 @@ class Signatures:
         middle = (edges[:-1] + edges[1:]) // 2
         return path.qpos[:, middle], path.qvel[:, middle], acceleration
 
-    def _inverse_dynamics(self, model: mujoco.MjModel) -> np.ndarray:
+    def inverse_dynamics(self, model: mujoco.MjModel) -> np.ndarray:
         """Generalised forces (W, S, nv) of rigid bodies alone: no contact, no friction, no servo."""
         if model is self.plant.model:
             if ("", 0) not in self._inverse:
-                self._inverse["", 0] = self._inverse_dynamics(copy.copy(self.plant.model))
+                self._inverse["", 0] = self.inverse_dynamics(copy.copy(self.plant.model))
             return self._inverse["", 0]
         off = mujoco.mjtDisableBit
         model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION) | int(off.mjDSBL_SPRING)

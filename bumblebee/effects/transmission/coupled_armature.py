@@ -1,4 +1,4 @@
-"""Inertia of the rotor of a motor that turns with two joints: with the sum of their angles, or with the difference."""
+"""Inertia of the rotor of a motor that turns with two joints, by the sum or the difference of their angles."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,7 +6,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bumblebee.effects.coupled import Coupled, coupled, joint_before
+from bumblebee.effects.coupled import Coupled, joint_before, ratio
+from bumblebee.effects.kind import INF, Parameter
 from bumblebee.effects.places import OnJoint, Step
 
 _PARALLEL = 0.99
@@ -14,14 +15,14 @@ _PARALLEL = 0.99
 
 
 class CoupledArmature(Coupled):
-    """-sum (a + ratio a_before), on both joints, and the same of the difference.
+    """-armature (a + ratio a_before) on the joint, `ratio` times that on the one before.
 
-    MuJoCo's armature of two fixed tendons along the joint and the one before it on its chain. Along parallel axes the
+    MuJoCo's armature of a fixed tendon along the joint and the one before it on its chain. Along parallel axes the
     link's own inertia is the same.
     """
 
     rank = 166
-    parameters = coupled("kg m^2")
+    parameters = (Parameter("armature", "kg m^2", 0.0, INF), ratio(-20.0))
     experiment = "accelerate both joints together, then against each other"
 
     def give(self, tendon: Any, size: float) -> None:

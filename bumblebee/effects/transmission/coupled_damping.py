@@ -1,22 +1,23 @@
-"""Viscous friction of a motor that turns with two joints: with the sum of their angles, or with the difference."""
+"""Viscous friction of a motor that turns with two joints, by the sum or the difference of their angles."""
 
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from bumblebee.effects.coupled import Coupled, coupled
+from bumblebee.effects.coupled import Coupled, ratio
+from bumblebee.effects.kind import INF, Parameter
 from bumblebee.effects.places import OnJoint
 
 
 class CoupledDamping(Coupled):
-    """-sum (v + ratio v_before), on both joints, and the same of the difference.
+    """-damping (v + ratio v_before) on the joint, `ratio` times that on the one before.
 
-    MuJoCo's damping of two fixed tendons along the joint and the one before it on its chain.
+    MuJoCo's damping of a fixed tendon along the joint and the one before it on its chain.
     """
 
     rank = 164
-    parameters = coupled("N m s/rad")
+    parameters = (Parameter("damping", "N m s/rad", 0.0, INF), ratio(-20.0))
     experiment = "move both joints together, then against each other, at several speeds"
 
     def give(self, tendon: Any, size: float) -> None:

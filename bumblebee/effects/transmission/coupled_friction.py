@@ -1,23 +1,25 @@
-"""Dry friction of a motor that turns with two joints: with the sum of their angles, or with the difference."""
+"""Dry friction of motors that turn with two joints, one with the sum of their angles and one with the difference."""
 
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from bumblebee.effects.coupled import Coupled, coupled
+from bumblebee.effects.coupled import Coupled, ratio
+from bumblebee.effects.kind import INF, Parameter
 from bumblebee.effects.mjcf import STICTION_ITERATIONS, STICTION_SOLIMP, STICTION_SOLREF
 from bumblebee.effects.places import OnJoint
 
 
 class CoupledFriction(Coupled):
-    """-sum sgn(v + ratio v_before), on both joints, and the same of the difference.
+    """-sum sgn(v + ratio v_before) on the joint, `ratio` times that on the one before; and so with the difference.
 
     MuJoCo's frictionloss of two fixed tendons along the joint and the one before it on its chain.
     """
 
     rank = 162
-    parameters = coupled("N m")
+    parameters = (Parameter("sum", "N m", 0.0, INF), Parameter("difference", "N m", 0.0, INF), ratio(0.05))
+    ways = (1.0, -1.0)
     experiment = "move both joints together, then against each other, at the same speeds"
 
     def add(self, spec: mujoco.MjSpec, place: str, *values: float) -> None:

@@ -67,7 +67,7 @@ def _rope(spec: mujoco.MjSpec, joint: str, neighbour: str, ratio: float) -> mujo
     return rope
 
 
-def _made(law: Callable[[str, str, float, float], Law]) -> Callable[[Place, float], Made]:
+def _rubs(law: Callable[[str, str, float, float], Law]) -> Callable[[Place, float], Made]:
     def make(p: Place, s: float) -> Made:
         ratio, way = _RATIOS[p.draw["axis"]], _WAYS[p.draw["sign"]]
         sizes = {other: s * (other == way) for other in _WAYS.values()}
@@ -76,11 +76,19 @@ def _made(law: Callable[[str, str, float, float], Law]) -> Callable[[Place, floa
     return make
 
 
+def _linear(law: Callable[[str, str, float, float], Law], name: str) -> Callable[[Place, float], Made]:
+    def make(p: Place, s: float) -> Made:
+        ratio = p.draw["sign"] * _RATIOS[p.draw["axis"]]
+        return law(p.name, p.robot.chained[p.name], ratio, s), {name: s, "ratio": ratio}
+
+    return make
+
+
 KINDS = (
-    Kind("coupled_friction", "pair", _made(CoupledFriction),
+    Kind("coupled_friction", "pair", _rubs(CoupledFriction),
          first=lambda p: 0.01 * p.of(p.robot.limit), most=lambda p: 0.15 * p.of(p.robot.limit), unit="N m"),
-    Kind("coupled_damping", "pair", _made(CoupledDamping),
+    Kind("coupled_damping", "pair", _linear(CoupledDamping, "damping"),
          first=lambda p: 0.03 * p.of(p.robot.kd), most=lambda p: p.of(p.robot.kd), unit="N m s/rad"),
-    Kind("coupled_armature", "crossed", _made(CoupledArmature),
+    Kind("coupled_armature", "crossed", _linear(CoupledArmature, "armature"),
          first=lambda p: 0.2 * p.of(p.robot.armature), most=lambda p: 4.0 * p.of(p.robot.armature), unit="kg m^2"),
 )  # fmt: skip

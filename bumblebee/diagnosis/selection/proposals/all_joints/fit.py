@@ -62,6 +62,16 @@ def fit_all_joints(
     return sure_by_misfit(problem, fit)
 
 
+def fit_begun(problem: Problem, begun: Begun) -> Fit | None:
+    """What is sure of effects and values that a fit begins with, simulated; None where nothing is."""
+    rule = problem.thresholds.selection.proposals.all_joints
+    some = problem.part(screening_windows(problem, rule.windows))
+    fit = levenberg_marquardt(some, *begun, rule.steps)
+    if fit.power(some) < rule.still_off:
+        return sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
+    return sure_by_misfit(problem, fit)
+
+
 def is_small(problem: Problem) -> bool:
     """Whether a robot's links can be asked all at once."""
     most = problem.thresholds.selection.proposals.all_joints.small_robot

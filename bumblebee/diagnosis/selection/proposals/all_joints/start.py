@@ -10,7 +10,8 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Expecting
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
-from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, fit_begun, is_small
+from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.errors import BadInput
@@ -70,6 +71,24 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]
     fit = yield from all_joints_of(run)
     rule = run.problem.thresholds.comparison.together
     if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
+        return False
+    yield begun_with(run, fit)
+    return True
+
+
+def start_by_inverse_dynamics(run: SearchState) -> Asking[bool]:
+    """Begin with the standard parameters where torques are logged on a fixed base far from the data; whether it did."""
+    plant = run.problem.plant
+    if not plant.torque_input or plant.floating or run.asked_far or run.fit.chosen or run.power() < run.config.far:
+        return False
+    yield Asked(far=True)
+    begun = standard_parameters(run.problem, run.candidates, run.config.level)
+    yield Expecting(len(begun[0]))
+    run.say(f"{len(begun[0])} standard parameters by inverse dynamics")
+    fit = fit_begun(run.problem, begun)
+    if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(
+        run.problem.thresholds.comparison.together
+    ):
         return False
     yield begun_with(run, fit)
     return True

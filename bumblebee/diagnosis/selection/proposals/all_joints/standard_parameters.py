@@ -1,0 +1,122 @@
+"""Standard parameters by linear regression on inverse dynamics: where a fit of a robot that is told torques begins.
+
+Far from the data a simulation of the declared model flies, and what holds it back wins: no strength at all, or friction
+beyond all measure. On the measured motion torques are linear in the standard parameters (Atkeson, An and Hollerbach
+1986), and one least-squares fit within bounds finds all of them. Every joint's friction and rotor are in it; loads,
+springs and motors that turn with two joints come in one after the other. Effects of the whole drive are left out: a
+drive of no strength on links of no mass explains every log.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+from scipy.stats import chi2
+
+from bumblebee.diagnosis.candidates import Candidate, absent, clipped, is_chosen
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.proposals.all_joints.begun import Begun
+from bumblebee.diagnosis.sensitivities import lacking_torque
+from bumblebee.sim.effects import CATALOGUE
+
+_WEIGHED = 5
+"""Times that the joints are weighed anew by what a fit leaves of them."""
+_NOTHING = 1e-6
+"""Share of a joint's lacking torque that is nothing."""
+
+
+def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level: float) -> Begun:
+    """Effects and values of a regression on the fitted windows, false alarms of what comes in held to `level`."""
+    every = [c for c in candidates if CATALOGUE[c.effect].standard]
+    regression, least = _Regression(problem, every), problem.thresholds.comparison.validation.least_share
+    chosen = [k for k, c in enumerate(every) if CATALOGUE[c.effect].usual == "joint"]
+    rest = [k for k in range(len(every)) if k not in chosen]
+    fit = regression.fit(chosen)
+    while rest:
+        k, gain, share = regression.best(fit, rest)
+        if share < least or gain < chi2.isf(level / len(every), len(every[k].free)):
+            break
+        larger = regression.fit([*fit.chosen, k], fit.scale)
+        rest.remove(k)
+        if larger.cost < (1 - least) * fit.cost:
+            fit = regression.fit(larger.chosen)
+            rest = [r for r in rest if not is_chosen(every[r], [every[k]])]
+    effects, at, values = [every[k] for k in fit.chosen], 0, []
+    for c in effects:
+        value = absent([c])
+        value[list(c.free)] += fit.sizes[at : at + len(c.free)] * np.array(c.step)[list(c.free)]
+        values.append(value)
+        at += len(c.free)
+    return effects, clipped(effects, np.concatenate(values))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Some of the candidates, by number."""
+
+    chosen: tuple[int, ...]
+    sizes: np.ndarray
+    """(P,) in their steps."""
+    left: np.ndarray
+    """(N, nv) torque that they leave [N m]."""
+    scale: np.ndarray
+    """(nv,) of it, by which it is weighed."""
+
+    @property
+    def cost(self) -> float:
+        return float(((self.left / self.scale) ** 2).sum())
+
+
+class _Regression:
+    """Least squares of the lacking torque on candidates' torques, within bounds."""
+
+    def __init__(self, problem: Problem, candidates: Sequence[Candidate]) -> None:
+        lacking = lacking_torque(problem)
+        self._lacking = lacking.torque.reshape(-1, lacking.torque.shape[-1])
+        self._torques = [
+            torque.reshape(len(torque), *self._lacking.shape) for torque in map(lacking.signatures.of, candidates)
+        ]
+        self._bounds = [_bounds(c) for c in candidates]
+
+    def fit(self, chosen: Sequence[int], scale: np.ndarray | None = None) -> _Fit:
+        """Fit some, by a scale or by that of what they leave."""
+        torques = np.concatenate([self._torques[k] for k in chosen])
+        low, high = np.concatenate([self._bounds[k] for k in chosen], axis=1)
+        given, scale = scale is not None, self._scale(self._lacking) if scale is None else scale
+        for _ in range(1 if given else _WEIGHED):
+            basis, triangle = np.linalg.qr((torques / scale).reshape(len(torques), -1).T)
+            sizes = lsq_linear(triangle, basis.T @ (self._lacking / scale).ravel(), (low, high)).x
+            left = self._lacking - np.tensordot(sizes, torques, axes=1)
+            fit = _Fit(tuple(chosen), sizes, left, scale)
+            scale = scale if given else self._scale(left)
+        return replace(fit, scale=scale)
+
+    def best(self, fit: _Fit, rest: Sequence[int]) -> tuple[int, float, float]:
+        """The one that would take most away beside a fit: which, how much of what is left as noise, which share."""
+        basis, _ = np.linalg.qr(self._flat(fit.chosen, fit.scale))
+        left = (fit.left / fit.scale).ravel()
+        left = left - basis @ (basis.T @ left)
+        total, gains = left @ left, []
+        for k in rest:
+            own = self._flat([k], fit.scale)
+            own = own - basis @ (basis.T @ own)
+            gains.append(left @ own @ np.linalg.lstsq(own, left)[0])
+        best = int(np.argmax(gains))
+        return rest[best], gains[best] * left.size / total, gains[best] / total
+
+    def _flat(self, chosen: Sequence[int], scale: np.ndarray) -> np.ndarray:
+        torques = np.concatenate([self._torques[k] for k in chosen])
+        return (torques / scale).reshape(len(torques), -1).T
+
+    def _scale(self, left: np.ndarray) -> np.ndarray:
+        """Median sizes (nv,) of what is left: friction at the turn of a motion is not linear."""
+        least = _NOTHING * np.median(np.abs(self._lacking), axis=0)
+        return np.maximum(np.median(np.abs(left), axis=0), np.maximum(least, 1e-300))
+
+
+def _bounds(c: Candidate) -> np.ndarray:
+    """Least and largest sizes (2, F) of a candidate's free parameters, in their steps."""
+    free = list(c.free)
+    ends = np.stack(CATALOGUE[c.effect].bounds(c.nominal, c.limits)) - absent([c])
+    return np.sort(ends[:, free] / np.array(c.step)[free], axis=0)

@@ -1,0 +1,56 @@
+"""The torque that the declared model lacks where the joints were measured to be: by inverse dynamics, not simulation.
+
+Where torques are logged, a model that is far from the data is no further off than one that is near: nothing flies.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.sensitivities.impulse_responses import Path
+from bumblebee.diagnosis.sensitivities.torque_signatures import Signatures
+from bumblebee.diagnosis.simulation import inputs_of, vary
+from bumblebee.diagnosis.thresholds.sensitivities import Impulses
+
+
+@dataclass(frozen=True, eq=False)
+class LackingTorque:
+    """Means over segments of W windows."""
+
+    signatures: Signatures
+    """What effects would be on the measured path."""
+    torque: np.ndarray
+    """(W, S, nv) [N m]."""
+
+
+def lacking_torque(problem: Problem) -> LackingTorque:
+    """Inverse dynamics less the drives' torques, of the declared model of a robot whose base is fixed."""
+    plant, rules = problem.plant, problem.thresholds.sensitivities
+    path = _measured_path(problem, rules.impulses)
+    signatures = Signatures(plant, problem.windows, vary(plant, []), path, rules.signatures)
+    lacking = np.empty((len(problem.windows), len(path.edges) - 1, plant.model.nv))
+    for number, under in enumerate(plant.every):
+        where = problem.windows.condition == number
+        lacking[where] = signatures.inverse_dynamics(under.model)[where]
+    dry = plant.model.dof_frictionloss[plant.dof] * signatures.sign
+    lacking[..., plant.dof] += path.mean(dry - signatures.torque)
+    return LackingTorque(signatures, lacking)
+
+
+def _measured_path(problem: Problem, rule: Impulses) -> Path:
+    """The windows as they were measured, between ticks on straight lines."""
+    plant, windows, step = problem.plant, problem.windows, problem.coarse
+    count = max(1, int(np.ceil(windows.span / step - 1e-6)))
+    control = inputs_of(windows, vary(plant, []), step, count, {})
+    edges = np.unique(np.linspace(0, count, min(rule.segments, count) + 1).round().astype(int))
+    qpos = np.repeat(windows.qpos[:, None], count + 1, axis=1)
+    qvel = np.repeat(windows.qvel[:, None], count + 1, axis=1)
+    at = step * np.arange(count + 1)
+    for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
+        rollout = windows.source[i]
+        time = rollout.time - rollout.time[k]
+        for j, (q, v) in enumerate(zip(plant.qpos, plant.dof, strict=True)):
+            qpos[w, :, q] = np.interp(at, time, rollout.joint_pos[:, j])
+            qvel[w, :, v] = np.interp(at, time, rollout.joint_vel[:, j])
+    return Path(step, qpos, qvel, control, edges, np.zeros((len(windows), count + 1, plant.model.na)))
