@@ -33,7 +33,8 @@ class Coupled(Kind):
     ways: tuple[float, ...] = (1.0,)
     """Sign of the ratio, of each motor."""
     absent = 0.0
-    structural = stateless = on_two_joints = standard = True
+    structural = stateless = on_two_joints = True
+    standard = "joint"
     drive = "any"
     law = OF_ONE_JOINT
     not_undone = "it is a torque on two joints at once, and what is sent is made joint by joint"

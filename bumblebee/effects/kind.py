@@ -104,8 +104,9 @@ class Kind:
     joints of stiff servos; or from simulation alone, for no torque stands for it."""
     on_two_joints: bool = False
     """Whether its torque is on another joint as well: `torque` then gets `Signatures`, as of what sits on a body."""
-    standard: bool = False
-    """Whether it is a standard parameter of a robot's dynamics: its torque is its size times what the motion says."""
+    standard: Literal["", "joint", "drive", "link"] = ""
+    """Whose standard parameter it is: its torque is its size times what the motion says. Where torques and masses are
+    both unknown nothing fixes their scale, so that of drives and links one is asked at a time."""
     fine_steps: bool = False
     """Whether coarse steps would falsify it: they hit a backlash too softly and a limit too late, let feet touch
     otherwise, and late feedback, computed beside the integrator, moves a servo by itself. A tilt is not simulated."""

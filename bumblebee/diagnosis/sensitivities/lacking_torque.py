@@ -22,6 +22,8 @@ class LackingTorque:
     """What effects would be on the measured path."""
     torque: np.ndarray
     """(W, S, nv) [N m]."""
+    asked: np.ndarray
+    """(W, S, nv) that the motion asks of the declared model's drives [N m]."""
 
 
 def lacking_torque(problem: Problem) -> LackingTorque:
@@ -29,13 +31,14 @@ def lacking_torque(problem: Problem) -> LackingTorque:
     plant, rules = problem.plant, problem.thresholds.sensitivities
     path = _measured_path(problem, rules.impulses)
     signatures = Signatures(plant, problem.windows, vary(plant, []), path, rules.signatures)
-    lacking = np.empty((len(problem.windows), len(path.edges) - 1, plant.model.nv))
+    asked = np.empty((len(problem.windows), len(path.edges) - 1, plant.model.nv))
     for number, under in enumerate(plant.every):
         where = problem.windows.condition == number
-        lacking[where] = signatures.inverse_dynamics(under.model)[where]
-    dry = plant.model.dof_frictionloss[plant.dof] * signatures.sign
-    lacking[..., plant.dof] += path.mean(dry - signatures.torque)
-    return LackingTorque(signatures, lacking)
+        asked[where] = signatures.inverse_dynamics(under.model)[where]
+    asked[..., plant.dof] += plant.model.dof_frictionloss[plant.dof] * path.mean(signatures.sign)
+    lacking = asked.copy()
+    lacking[..., plant.dof] -= path.mean(signatures.torque)
+    return LackingTorque(signatures, lacking, asked)
 
 
 def _measured_path(problem: Problem, rule: Impulses) -> Path:

@@ -20,7 +20,7 @@ class LinkCom(Kind):
     rank = 310
     parameters = tuple(Parameter(axis, "m", -2.0, 2.0) for axis in ("x", "y", "z"))
     constants = True
-    standard = True
+    standard = "link"
     experiment = "hold the link still in several poses and log the torque"
     usual = "body"
     law = OF_ONE_JOINT

@@ -20,7 +20,7 @@ class LinkInertia(Kind):
     rank = 320
     parameters = tuple(Parameter(axis, "kg m^2", 1e-9, INF) for axis in ("xx", "yy", "zz"))
     constants = True
-    standard = True
+    standard = "link"
     experiment = "swing the link fast about each axis"
     law = OF_ONE_JOINT
     not_undone = "it asks for torque only as the whole body accelerates, which is not planned for"

@@ -21,7 +21,7 @@ class LinkMass(Kind):
     rank = 300
     parameters = (Parameter("mass", "kg", 1e-3, INF), Parameter("spread", "", 0.0, 1.0, 0.0))
     constants = True
-    standard = True
+    standard = "link"
     experiment = "add 2 kg to the link, or weigh it"
     usual, named_first = "body", 7
     law = OF_ONE_JOINT

@@ -20,6 +20,7 @@ class MotorStrength(Kind):
     parameters = (Parameter("factor", "", 1e-3, 20.0),)
     absent = 1.0
     drive = "scaled"
+    standard = "drive"
     experiment = "hold a known load at rest, and vary kp and kd together"
     usual, named_first = "joint", 4
     law = Law(fixed((("tau",), TORQUE, 1)), "", driven=True)

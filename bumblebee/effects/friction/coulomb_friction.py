@@ -19,7 +19,7 @@ class CoulombFriction(Kind):
 
     rank = 10
     parameters = (Parameter("frictionloss", "N m", 0.0, INF),)
-    standard = True
+    standard = "joint"
     experiment = "move at several speeds under several loads"
     usual, named_first = "joint", 1
     law = Law(fixed((("friction(1)",), VELOCITY, 1)), "friction(", lambda now, was: {"friction(1)": now[0] - was[0]})

@@ -20,6 +20,7 @@ class LoadDependentFriction(Kind):
     parameters = (Parameter("coefficient", "", 0.0, 2.0), Parameter("difference", "", -4.0, 4.0, 0.0))
     native, absent = False, 0.0
     drive = "any"
+    standard = "drive"
     experiment = "move at the same speed under two loads"
     usual = "torque"
     law = Law(

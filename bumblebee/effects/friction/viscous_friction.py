@@ -18,7 +18,7 @@ class ViscousFriction(Kind):
 
     rank = 20
     parameters = (Parameter("damping", "N m s/rad", 0.0, INF),)
-    standard = True
+    standard = "joint"
     experiment = "vary kd, or command a velocity: a servo's damping follows both, a joint's does not"
     usual, named_first = "joint", 2
     law = Law(fixed((("v",), VELOCITY, 1)), "v", lambda now, was: {"v": -(now[0] - was[0])})

@@ -18,7 +18,7 @@ class Armature(Kind):
     rank = 60
     parameters = (Parameter("armature", "kg m^2", 0.0, INF),)
     constants = True
-    standard = True
+    standard = "joint"
     experiment = "accelerate the joint with the link taken off or with a known weight on it"
     usual, named_first = "joint", 3
     law = "no term has the acceleration"

@@ -18,7 +18,7 @@ class JointSpring(Kind):
 
     rank = 70
     parameters = (Parameter("stiffness", "N m/rad", -INF, INF), Parameter("preload", "N m", -INF, INF))
-    standard = True
+    standard = "link"
     experiment = "move the joint slowly through its whole range, unpowered"
     law = Law(
         fixed((("1",), (), 1), (("q", "1"), POSITION, 1)),

@@ -62,14 +62,20 @@ def fit_all_joints(
     return sure_by_misfit(problem, fit)
 
 
-def fit_begun(problem: Problem, begun: Begun) -> Fit | None:
-    """What is sure of effects and values that a fit begins with, simulated; None where nothing is."""
+def simulated(problem: Problem, several: Sequence[Begun]) -> Fit:
+    """Simulated from each beginning, and fitted on; the fit that leaves least."""
     rule = problem.thresholds.selection.proposals.all_joints
     some = problem.part(screening_windows(problem, rule.windows))
-    fit = levenberg_marquardt(some, *begun, rule.steps)
-    if fit.power(some) < rule.still_off:
-        return sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
-    return sure_by_misfit(problem, fit)
+    fits = [levenberg_marquardt(some, *begun, rule.steps) for begun in several]
+    best = min(fits, key=lambda fit: fit.power(some))
+    return gauss_newton(problem, best.chosen, best.values, np.ones(len(problem.windows)), iterations=0)
+
+
+def sure_among(problem: Problem, fit: Fit) -> Fit | None:
+    """The effects of a fit that are sure on all windows, after some more steps there; None where none is."""
+    rule = problem.thresholds.selection.proposals.all_joints
+    fit = levenberg_marquardt(problem, fit.chosen, fit.values, rule.steps)
+    return sure_of(problem, fit) if fit.power(problem) < rule.still_off else sure_by_misfit(problem, fit)
 
 
 def is_small(problem: Problem) -> bool:

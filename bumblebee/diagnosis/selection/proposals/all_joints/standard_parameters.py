@@ -2,9 +2,11 @@
 
 Far from the data a simulation of the declared model flies, and what holds it back wins: no strength at all, or friction
 beyond all measure. On the measured motion torques are linear in the standard parameters (Atkeson, An and Hollerbach
-1986), and one least-squares fit within bounds finds all of them. Every joint's friction and rotor are in it; loads,
-springs and motors that turn with two joints come in one after the other. Effects of the whole drive are left out: a
-drive of no strength on links of no mass explains every log.
+1986), and one least-squares fit within bounds finds all of them. Every joint's friction and rotor are in it; others
+come in one after the other: loads and springs at the drives' declared strengths, or strengths and friction that goes
+with load at the links' declared masses. Both together have no scale: a drive of no strength on links of no mass
+explains every log. A drive's strength f is asked as what it takes of the torque that the motion asks, (1 - 1 / f) of
+it, and friction that goes with load by that torque too: as shares of the drive's own they would explain it away.
 """
 
 from collections.abc import Sequence
@@ -17,20 +19,33 @@ from scipy.stats import chi2
 from bumblebee.diagnosis.candidates import Candidate, absent, clipped, is_chosen
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import Begun
-from bumblebee.diagnosis.sensitivities import lacking_torque
+from bumblebee.diagnosis.sensitivities import LackingTorque, lacking_torque
 from bumblebee.sim.effects import CATALOGUE
 
+_STRENGTH = "motor_strength"
 _WEIGHED = 5
 """Times that the joints are weighed anew by what a fit leaves of them."""
 _NOTHING = 1e-6
 """Share of a joint's lacking torque that is nothing."""
 
 
-def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level: float) -> Begun:
-    """Effects and values of a regression on the fitted windows, false alarms of what comes in held to `level`."""
-    every = [c for c in candidates if CATALOGUE[c.effect].standard]
-    regression, least = _Regression(problem, every), problem.thresholds.comparison.validation.least_share
-    chosen = [k for k, c in enumerate(every) if CATALOGUE[c.effect].usual == "joint"]
+def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level: float) -> list[Begun]:
+    """Effects and values of regressions on the fitted windows, beside those of drives and beside those of links.
+
+    False alarms of what comes in one after the other are held to `level`.
+    """
+    lacking = lacking_torque(problem)
+    kinds = {"drive", "link"}
+    return [
+        _beside(problem, [c for c in candidates if CATALOGUE[c.effect].standard in ("joint", k)], lacking, level)
+        for k in sorted(kinds)
+    ]
+
+
+def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque, level: float) -> Begun:
+    """The joints' effects, and of `every` those that come in beside them."""
+    regression, least = _Regression(lacking, every), problem.thresholds.comparison.validation.least_share
+    chosen = [k for k, c in enumerate(every) if CATALOGUE[c.effect].standard == CATALOGUE[c.effect].usual]
     rest = [k for k in range(len(every)) if k not in chosen]
     fit = regression.fit(chosen)
     while rest:
@@ -42,12 +57,19 @@ def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level
         if larger.cost < (1 - least) * fit.cost:
             fit = regression.fit(larger.chosen)
             rest = [r for r in rest if not is_chosen(every[r], [every[k]])]
-    effects, at, values = [every[k] for k in fit.chosen], 0, []
-    for c in effects:
-        value = absent([c])
-        value[list(c.free)] += fit.sizes[at : at + len(c.free)] * np.array(c.step)[list(c.free)]
+    return _as_values([every[k] for k in fit.chosen], fit.sizes)
+
+
+def _as_values(effects: Sequence[Candidate], sizes: np.ndarray) -> Begun:
+    """Effects and values from sizes (P,) of their free parameters, those on a joint as its drive's strength says."""
+    ends = np.cumsum([len(c.free) for c in effects])
+    own = np.split(sizes, ends[:-1])
+    shares = {c.where: c.step[0] * size[0] for c, size in zip(effects, own, strict=True) if c.effect == _STRENGTH}
+    values = []
+    for c, size in zip(effects, own, strict=True):
+        strength, value = 1.0 / (1.0 - shares.get(c.where, 0.0)), absent([c])
+        value[list(c.free)] += strength * size * np.array(c.step)[list(c.free)]
         values.append(value)
-        at += len(c.free)
     return effects, clipped(effects, np.concatenate(values))
 
 
@@ -71,13 +93,19 @@ class _Fit:
 class _Regression:
     """Least squares of the lacking torque on candidates' torques, within bounds."""
 
-    def __init__(self, problem: Problem, candidates: Sequence[Candidate]) -> None:
-        lacking = lacking_torque(problem)
+    def __init__(self, lacking: LackingTorque, candidates: Sequence[Candidate]) -> None:
         self._lacking = lacking.torque.reshape(-1, lacking.torque.shape[-1])
         self._torques = [
             torque.reshape(len(torque), *self._lacking.shape) for torque in map(lacking.signatures.of, candidates)
         ]
         self._bounds = [_bounds(c) for c in candidates]
+        for k, c in enumerate(candidates):
+            if CATALOGUE[c.effect].standard == "drive":
+                own = self._torques[k]
+                asked = np.where(own, lacking.asked.reshape(self._lacking.shape), 0.0)
+                self._torques[k] = c.step[0] * (asked if c.effect == _STRENGTH else np.sign(own) * np.abs(asked))
+            if c.effect == _STRENGTH:
+                self._bounds[k] = np.array([[-np.inf], [np.inf]])
 
     def fit(self, chosen: Sequence[int], scale: np.ndarray | None = None) -> _Fit:
         """Fit some, by a scale or by that of what they leave."""

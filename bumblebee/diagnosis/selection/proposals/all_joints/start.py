@@ -10,7 +10,7 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Expecting
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
-from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, fit_begun, is_small
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small, simulated, sure_among
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
@@ -83,14 +83,17 @@ def start_by_inverse_dynamics(run: SearchState) -> Asking[bool]:
         return False
     yield Asked(far=True)
     begun = standard_parameters(run.problem, run.candidates, run.config.level)
-    yield Expecting(len(begun[0]))
-    run.say(f"{len(begun[0])} standard parameters by inverse dynamics")
-    fit = fit_begun(run.problem, begun)
-    if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(
-        run.problem.thresholds.comparison.together
-    ):
+    yield Expecting(max(len(chosen) for chosen, _ in begun))
+    fit = simulated(run.problem, begun)
+    run.say(f"{len(fit.chosen)} standard parameters by inverse dynamics: chi-square {fit.power(run.problem):.3g}")
+    problem, holdout, fit = whitened_anew(run.problem, run.holdout, fit)
+    sure = sure_among(problem, fit)
+    if sure is None:
         return False
-    yield begun_with(run, fit)
+    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
+    if not compare(problem, holdout, declared, sure).passes(problem.thresholds.comparison.together):
+        return False
+    yield Anew(problem, holdout, sure, begun=True)
     return True
 
 
