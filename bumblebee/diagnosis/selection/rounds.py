@@ -9,11 +9,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import SATURATIONS, Candidate
 from bumblebee.diagnosis.selection.changes import Asking
-from bumblebee.diagnosis.selection.proposals.all_joints import (
-    start_by_inverse_dynamics,
-    start_far_off,
-    start_with_all_joints,
-)
+from bumblebee.diagnosis.selection.proposals.all_joints import start_far_off, start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.drive_grid import drive_trials
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import joint_elasticity_trials
@@ -89,10 +85,6 @@ def _best(now: Round, run: SearchState) -> Asking[list[Trial]]:
     return tried
 
 
-def _measured(now: Round, run: SearchState) -> Asking[list[Trial] | None]:
-    return None if (yield from start_by_inverse_dynamics(run)) else []
-
-
 def _far_off(now: Round, run: SearchState) -> Asking[list[Trial] | None]:
     return None if (yield from start_far_off(run, now.tried)) else []
 
@@ -134,7 +126,6 @@ SINGLE = (
 )
 """Single effects, drives far from the declared ones first."""
 PROPOSALS = (
-    Proposal("standard parameters", _measured),
     *SINGLE,
     Proposal(ALL_JOINTS, _far_off),
     Proposal(ALL_JOINTS, _all_joints, when=lambda now: not now.explains_much),

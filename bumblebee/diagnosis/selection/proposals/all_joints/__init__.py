@@ -19,7 +19,6 @@ from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joint
 from bumblebee.diagnosis.selection.proposals.all_joints.start import (
     all_joints_of,
     begun_with,
-    start_by_inverse_dynamics,
     start_far_off,
     start_with_all_joints,
     whitened_anew,
@@ -29,7 +28,6 @@ __all__ = [
     "all_joints_of",
     "begun_with",
     "fit_all_joints",
-    "start_by_inverse_dynamics",
     "start_far_off",
     "start_with_all_joints",
     "whitened_anew",

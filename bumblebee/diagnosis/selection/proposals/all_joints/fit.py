@@ -84,6 +84,11 @@ def is_small(problem: Problem) -> bool:
     return problem.plant.model.nv <= most and not problem.plant.floating
 
 
+def is_told_torques(problem: Problem) -> bool:
+    """Whether inverse dynamics says what a robot lacks: torques are logged, and no ground pushes back."""
+    return problem.plant.torque_input and not problem.plant.floating
+
+
 def _of_small(problem: Problem, usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> Fit:
     """A load alone that leaves little, else the first sets that do, or what leaves much less than all before it."""
     rule, better = problem.thresholds.selection.proposals.all_joints, partial(_better, problem)

@@ -10,7 +10,13 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Expecting
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
-from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small, simulated, sure_among
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import (
+    fit_all_joints,
+    is_small,
+    is_told_torques,
+    simulated,
+    sure_among,
+)
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
@@ -45,7 +51,16 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
 
 
 def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]:
-    """Fit the usual effects of all joints, see `fit_all_joints`; all of them may come at once."""
+    """Fit the usual effects of all joints, see `fit_all_joints`; all of them may come at once.
+
+    Of a robot on a fixed base that is told torques its standard parameters, by inverse dynamics.
+    """
+    if is_told_torques(run.problem):
+        begun = standard_parameters(run.problem, run.candidates, run.config.level)
+        yield Expecting(max(len(chosen) for chosen, _ in begun))
+        fit = simulated(run.problem, begun)
+        run.say(f"{len(fit.chosen)} standard parameters by inverse dynamics: chi-square {fit.power(run.problem):.3g}")
+        return fit
     yield Expecting(len(usual_effects(run.candidates, run.problem.plant.torque_input)))
     return fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
 
@@ -76,27 +91,6 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]
     return True
 
 
-def start_by_inverse_dynamics(run: SearchState) -> Asking[bool]:
-    """Begin with the standard parameters where torques are logged on a fixed base far from the data; whether it did."""
-    plant = run.problem.plant
-    if not plant.torque_input or plant.floating or run.asked_far or run.fit.chosen or run.power() < run.config.far:
-        return False
-    yield Asked(far=True)
-    begun = standard_parameters(run.problem, run.candidates, run.config.level)
-    yield Expecting(max(len(chosen) for chosen, _ in begun))
-    fit = simulated(run.problem, begun)
-    run.say(f"{len(fit.chosen)} standard parameters by inverse dynamics: chi-square {fit.power(run.problem):.3g}")
-    problem, holdout, fit = whitened_anew(run.problem, run.holdout, fit)
-    sure = sure_among(problem, fit)
-    if sure is None:
-        return False
-    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
-    if not compare(problem, holdout, declared, sure).passes(problem.thresholds.comparison.together):
-        return False
-    yield Anew(problem, holdout, sure, begun=True)
-    return True
-
-
 def start_far_off(run: SearchState, tried: Sequence[Trial]) -> Asking[bool]:
     """Begin with the usual effects of all joints of a robot that is far from the data; whether it did.
 
@@ -105,7 +99,8 @@ def start_far_off(run: SearchState, tried: Sequence[Trial]) -> Asking[bool]:
     """
     rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
     small = is_small(run.problem)
-    if run.asked_far or run.fit.chosen or declared < run.config.far or not (small or _is_worth_minutes(run, tried)):
+    quick = small or is_told_torques(run.problem)
+    if run.asked_far or run.fit.chosen or declared < run.config.far or not (quick or _is_worth_minutes(run, tried)):
         return False
     yield Asked(far=True)
     fit = yield from all_joints_of(run)
@@ -129,5 +124,8 @@ def _is_worth_minutes(run: SearchState, tried: Sequence[Trial]) -> bool:
 
 
 def begun_with(run: SearchState, fit: Fit) -> Anew:
-    """A beginning anew with many effects at once."""
-    return Anew(*whitened_anew(run.problem, run.holdout, fit), begun=True)
+    """A beginning anew with many effects at once; standard parameters that are not sure there are taken out."""
+    problem, holdout, fit = whitened_anew(run.problem, run.holdout, fit)
+    if is_told_torques(problem):
+        fit = sure_among(problem, fit) or fit
+    return Anew(problem, holdout, fit, begun=True)
