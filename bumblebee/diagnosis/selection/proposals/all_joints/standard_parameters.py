@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.candidates import Candidate, absent, clipped, is_chosen
+from bumblebee.diagnosis.candidates import USUAL_OF_ROBOT, Candidate, absent, clipped, is_chosen
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import Begun
 from bumblebee.diagnosis.sensitivities import LackingTorque, lacking_torque
@@ -32,14 +32,13 @@ _NOTHING = 1e-6
 def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level: float) -> list[Begun]:
     """Effects and values of regressions on the fitted windows, beside those of drives and beside those of links.
 
-    False alarms of what comes in one after the other are held to `level`.
+    False alarms of what comes in one after the other are held to `level`. What else every robot has, a delay, begins
+    at none.
     """
-    lacking = lacking_torque(problem)
-    kinds = {"drive", "link"}
-    return [
-        _beside(problem, [c for c in candidates if CATALOGUE[c.effect].standard in ("joint", k)], lacking, level)
-        for k in sorted(kinds)
-    ]
+    lacking, robot = lacking_torque(problem), [c for c in candidates if c.effect in USUAL_OF_ROBOT and not c.where]
+    every = ([c for c in candidates if CATALOGUE[c.effect].standard in ("joint", k)] for k in ("drive", "link"))
+    begun = (_beside(problem, some, lacking, level) for some in every)
+    return [([*chosen, *robot], np.concatenate((values, absent(robot)))) for chosen, values in begun]
 
 
 def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque, level: float) -> Begun:
