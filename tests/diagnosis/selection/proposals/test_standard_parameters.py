@@ -1,0 +1,128 @@
+"""A robot that logs torques and whose model has no friction and no rotors: found by inverse dynamics, then simulated."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.candidates import Candidate, all_candidates
+from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effects import CATALOGUE
+from tests.diagnosis import arm
+
+JOINTS = ("j1", "j2", "j3")
+ROTORS, DRY, VISCOUS = (0.4, 0.1, 0.02), (2.0, 1.0, 0.3), (3.0, 1.0, 0.2)
+STIFF = 'solreffriction="0.004 1" solimpfriction=".999 .999 .001"'
+NONE = (0.0, 0.0, 0.0)
+
+
+def xml(rotors: tuple = NONE, dry: tuple = NONE, viscous: tuple = NONE, tendon: str = "", hand: float = 0.8) -> str:
+    """An arm of three joints whose last one rolls; `hand` is the mass of the last link."""
+    links = (("0 0 1", 4.0, ".02 0 .1"), ("0 1 0", 2.5, ".03 .02 .2"), ("0 0 1", hand, ".05 .02 .1"))
+    bodies = "".join(
+        f'<body name="l{k + 1}" pos="0 0 .3"><joint name="j{k + 1}" axis="{axis}" armature="{rotors[k]}" '
+        f'frictionloss="{dry[k]}" damping="{viscous[k]}" {STIFF}/>'
+        f'<inertial pos="{com}" mass="{mass}" diaginertia=".03 .03 .01"/>'
+        for k, (axis, mass, com) in enumerate(links)
+    )
+    motors = "".join(f'<motor name="{j}" joint="{j}"/>' for j in JOINTS)
+    return (
+        '<mujoco><compiler angle="radian"/><option timestep=".002" integrator="implicitfast"/><worldbody>'
+        f"{bodies}{'</body>' * 3}</worldbody>{tendon}<actuator>{motors}</actuator></mujoco>"
+    )
+
+
+COUPLED = (
+    f'<tendon><fixed frictionloss=".5" damping=".4" armature=".03" {STIFF}>'
+    '<joint joint="j2" coef="1"/><joint joint="j3" coef="1"/></fixed></tendon>'
+)
+
+
+def rollouts(true: str, arrives: tuple[float, ...] = (1.0, 1.0, 1.0), count: int = 3) -> list[Rollout]:
+    """Runs of 4 s at 100 Hz under a PD drive whose torque is logged; the share `arrives` of it reaches the joint."""
+    model, made = mujoco.MjModel.from_xml_string(true), []
+    model.opt.timestep = 0.0005
+    kp, kd = np.array([400.0, 200.0, 40.0]), np.array([40.0, 20.0, 4.0])
+    for number in range(count):
+        rng, time = np.random.default_rng(number), np.arange(400) / 100
+        size, pace, phase = rng.uniform(0.2, 0.5, (3, 3)), rng.uniform(1.5, 7.0, (3, 3)), rng.uniform(0, 6.0, (3, 3))
+        target = (size * np.sin(pace * time[:, None, None] + phase)).sum(axis=2)
+        data = mujoco.MjData(model)
+        data.qpos[:] = target[0]
+        rows = []
+        for wanted in target:
+            torque = kp * (wanted - data.qpos) - kd * data.qvel
+            rows.append((data.qpos.copy(), data.qvel.copy(), torque))
+            data.ctrl[:] = np.array(arrives) * torque
+            mujoco.mj_step(model, data, 20)
+        q, v, sent = (np.array(part) for part in zip(*rows, strict=True))
+        q, v = q + 2e-5 * rng.standard_normal(q.shape), v + 2e-3 * rng.standard_normal(v.shape)
+        made.append(Rollout(f"r{number}", JOINTS, 100.0, time, q, v, joint_torque_cmd=sent))
+    return made
+
+
+def regressed(logs: list[Rollout]) -> list[dict[tuple[str, str], np.ndarray]]:
+    """Values by (effect, place) of both regressions, beside the drives' and beside the links'."""
+    session = arm.session_of(logs, xml())
+    problem = arm.problem_of(session, [0, 1, 2], 60)
+    every = all_candidates(session.plant, session.rollouts, [])
+    return [_by_place(*begun) for begun in standard_parameters(problem, every, 0.005)]
+
+
+def _by_place(chosen: list[Candidate], values: np.ndarray) -> dict[tuple[str, str], np.ndarray]:
+    ends = np.cumsum([len(c.nominal) for c in chosen])
+    return {(c.effect, c.where): v for c, v in zip(chosen, np.split(values, ends[:-1]), strict=True)}
+
+
+TRUE = {(kind, joint): size for kind, sizes in
+        (("armature", ROTORS), ("coulomb_friction", DRY), ("viscous_friction", VISCOUS))
+        for joint, size in zip(JOINTS, sizes, strict=True)}  # fmt: skip
+
+
+def test_friction_rotors_and_a_coupled_motor_come_out_near_their_sizes() -> None:
+    for found in regressed(rollouts(xml(ROTORS, DRY, VISCOUS, COUPLED))):
+        for place, size in TRUE.items():
+            assert found[place][0] == pytest.approx(size, rel=0.25), place
+        assert found["coupled_friction", "j3"] == pytest.approx([0.5, 0.0, 1.0], abs=0.05)
+        assert found["coupled_damping", "j3"] == pytest.approx([0.4, 1.0], abs=0.1)
+        assert found["coupled_armature", "j3"] == pytest.approx([0.03, 1.0], abs=0.015)
+        assert not {kind for kind, _ in found} & {"motor_strength", "link_mass"}
+
+
+def test_a_drive_that_gives_less_is_told_from_no_drive_at_all() -> None:
+    drives, links = regressed(rollouts(xml(ROTORS, DRY, VISCOUS), arrives=(1.0, 0.85, 1.0)))
+    assert drives["motor_strength", "j2"][0] == pytest.approx(0.85, abs=0.03)
+    for place, size in TRUE.items():
+        assert drives[place][0] == pytest.approx(size, rel=0.25), place
+    assert not any(kind == "motor_strength" for kind, _ in links)
+
+
+def test_a_load_is_told_at_the_declared_strengths() -> None:
+    _, links = regressed(rollouts(xml(ROTORS, DRY, VISCOUS, hand=1.6)))
+    assert links["link_mass", "l3"][0] == pytest.approx(1.6, rel=0.1)
+
+
+def test_a_robot_a_radian_off_is_brought_to_the_noise() -> None:
+    session = arm.session_of(rollouts(xml(ROTORS, DRY, VISCOUS, COUPLED), count=4), xml())
+    result = diagnose(session, replace(arm.SMALL, max_windows=40))
+    after = {(e.effect, e.where[0]): e.values() for e in result.effects}
+    for k, joint in enumerate(JOINTS):
+        assert after["coulomb_friction", joint][0] == pytest.approx(DRY[k], rel=0.02), joint
+    assert after["coupled_friction", "j3"] == pytest.approx((0.5, 0.0, 1.0), abs=0.02)
+    assert _of_wrist(after, "armature") == pytest.approx(np.array([[0.13, 0.03], [0.03, 0.05]]), rel=0.05)
+    assert _of_wrist(after, "damping") == pytest.approx(np.array([[1.4, 0.4], [0.4, 0.6]]), rel=0.05)
+    assert not {kind for kind, _ in after} - {kind for kind, _ in TRUE} - {e for e in CATALOGUE if "coupled" in e}
+    error = result.document["error"]
+    before, left = (error[kind]["0.2"]["joint_pos_rmse"]["value"] for kind in ("before", "after"))
+    assert before > 0.5 and left < 2e-3
+
+
+def _of_wrist(found: dict[tuple[str, str], tuple[float, ...]], what: str) -> np.ndarray:
+    """What effects add to the wrist's inertia or damping (2, 2): with both joints' own, no ratio is the only one."""
+    own = {"armature": "armature", "damping": "viscous_friction"}[what]
+    size, ratio = found[f"coupled_{what}", "j3"]
+    motor = np.array([ratio, 1.0])
+    return np.diag([found.get((own, joint), (0.0,))[0] for joint in JOINTS[1:]]) + size * np.outer(motor, motor)
