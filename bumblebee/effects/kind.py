@@ -124,11 +124,10 @@ class Kind:
     a fit has; those of the validation must not speak against it."""
     on_dry_friction: bool = False
     """Whether it is a friction that sits on a level, which is dry friction again."""
-    usual: Literal["", "position", "joint", "torque", "robot", "body"] = ""
-    """Whether every robot has it: every joint (`position`: only where drives are told positions, `torque`: only where
-    they are told torques), the whole robot, or every link. PACE's set (Bjelonic et al. 2025: armature, damping,
-    friction, offset, delay), the drive's strength and the servo's damping, which can be less than declared, as friction
-    cannot. Of a drive that is told its torque gears rub with it, and an offset shows as a centre of mass does."""
+    usual: Literal["", "joint", "robot", "body"] = ""
+    """Whether every robot has it: every joint, the whole robot, or every link. PACE's set (Bjelonic et al. 2025:
+    armature, damping, friction, offset, delay), the drive's strength and the servo's damping, which can be less than
+    declared, as friction cannot."""
     named_first: int = 0
     """Place in the order in which effects that fit equally are named, the most often met first; 0: after these."""
     law: Law | str = ""

@@ -12,8 +12,7 @@ def _which(trait: str, *values: object) -> tuple[str, ...]:
 INVERSE, ABRUPT, JUDGED_ALONE, SATURATIONS, SHAPED = (
     _which(trait, True) for trait in ("inverse", "abrupt", "judged_alone", "saturation", "on_dry_friction")
 )
-USUAL, USUAL_OF_TORQUE = _which("usual", "joint", "position"), _which("usual", "joint", "torque")
-USUAL_OF_ROBOT, USUAL_OF_BODIES = _which("usual", "robot"), _which("usual", "body")
+USUAL, USUAL_OF_ROBOT, USUAL_OF_BODIES = (_which("usual", of) for of in ("joint", "robot", "body"))
 (IMU_TILT,) = _which("base", True)
 
 

@@ -19,7 +19,7 @@ class LackingTorque:
     """Means over segments of W windows."""
 
     signatures: Signatures
-    """What effects would be on the measured path."""
+    """Torques that effects would be on the measured path."""
     torque: np.ndarray
     """(W, S, nv) [N m]."""
     asked: np.ndarray

@@ -20,7 +20,7 @@ class Kd(Kind):
     absent = 1.0
     drive = "position"
     experiment = "vary kd: an error of the gain grows with it, friction does not"
-    usual = "position"
+    usual = "joint"
     law = "its torque is that of v, which is called viscous_friction"
 
     def add(self, spec: mujoco.MjSpec, place: str, *values: float) -> None:

@@ -22,7 +22,6 @@ class LoadDependentFriction(Kind):
     drive = "any"
     standard = "drive"
     experiment = "move at the same speed under two loads"
-    usual = "torque"
     law = Law(
         fixed((("friction(abs(tau))",), TORQUE, 2)),
         "friction(",

@@ -19,7 +19,7 @@ class EncoderOffset(Kind):
     native = False
     experiment = "move the joint against a stop of known angle"
     column = "simulated"
-    usual, named_first = "position", 6
+    usual, named_first = "joint", 6
     law = IN_THE_READINGS
 
     def add(self, spec: mujoco.MjSpec, place: str, *values: float) -> None:

@@ -16,7 +16,7 @@ class AllJoints:
     steps_with_links: int = 5
     """Steps of that way with the links' effects, which begin from the joints'."""
     rounds: int = 3
-    """Rounds of fitting on all windows and taking out what is not sure there."""
+    """Rounds of fitting on all windows and taking out what is not sure there; of weighing joints by what is left."""
     small_robot: int = 12
     """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
     still_off: float = 2.0

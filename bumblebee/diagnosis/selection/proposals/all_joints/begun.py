@@ -7,7 +7,6 @@ import numpy as np
 from bumblebee.diagnosis.candidates import (
     USUAL,
     USUAL_OF_ROBOT,
-    USUAL_OF_TORQUE,
     Candidate,
     absent,
     clipped,
@@ -23,10 +22,9 @@ Begun = tuple[Sequence[Candidate], np.ndarray]
 """Effects and the values (P,) that their fit begins with."""
 
 
-def usual_effects(candidates: Sequence[Candidate], torque: bool = False) -> list[Candidate]:
-    """Candidates that every joint of a real robot has; `torque`: whose drives are told torques."""
-    kinds = USUAL_OF_TORQUE if torque else USUAL
-    return [c for c in candidates if (c.effect in kinds and c.where) or (c.effect in USUAL_OF_ROBOT and not c.where)]
+def usual_effects(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates that every joint of a real robot has."""
+    return [c for c in candidates if (c.effect in USUAL and c.where) or (c.effect in USUAL_OF_ROBOT and not c.where)]
 
 
 def is_whole(c: Candidate) -> bool:

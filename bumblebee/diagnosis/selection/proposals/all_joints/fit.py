@@ -38,7 +38,7 @@ def fit_all_joints(
     else there is.
     """
     rule = problem.thresholds.selection.proposals.all_joints
-    usual = usual_effects(candidates, problem.plant.torque_input)
+    usual = usual_effects(candidates)
     if not usual:
         return None
     some = problem.part(screening_windows(problem, rule.windows))

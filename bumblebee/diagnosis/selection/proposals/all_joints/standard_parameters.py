@@ -23,8 +23,6 @@ from bumblebee.diagnosis.sensitivities import LackingTorque, lacking_torque
 from bumblebee.sim.effects import CATALOGUE
 
 _STRENGTH = "motor_strength"
-_WEIGHED = 5
-"""Times that the joints are weighed anew by what a fit leaves of them."""
 _NOTHING = 1e-6
 """Share of a joint's lacking torque that is nothing."""
 
@@ -43,7 +41,8 @@ def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level
 
 def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque, level: float) -> Begun:
     """The joints' effects, and of `every` those that come in beside them."""
-    regression, least = _Regression(lacking, every), problem.thresholds.comparison.validation.least_share
+    regression = _Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
+    least = problem.thresholds.comparison.validation.least_share
     chosen = [k for k, c in enumerate(every) if CATALOGUE[c.effect].standard == CATALOGUE[c.effect].usual]
     rest = [k for k in range(len(every)) if k not in chosen]
     fit = regression.fit(chosen)
@@ -92,7 +91,8 @@ class _Fit:
 class _Regression:
     """Least squares of the lacking torque on candidates' torques, within bounds."""
 
-    def __init__(self, lacking: LackingTorque, candidates: Sequence[Candidate]) -> None:
+    def __init__(self, lacking: LackingTorque, candidates: Sequence[Candidate], rounds: int) -> None:
+        self._rounds = rounds
         self._lacking = lacking.torque.reshape(-1, lacking.torque.shape[-1])
         self._torques = [
             torque.reshape(len(torque), *self._lacking.shape) for torque in map(lacking.signatures.of, candidates)
@@ -111,7 +111,7 @@ class _Regression:
         torques = np.concatenate([self._torques[k] for k in chosen])
         low, high = np.concatenate([self._bounds[k] for k in chosen], axis=1)
         given, scale = scale is not None, self._scale(self._lacking) if scale is None else scale
-        for _ in range(1 if given else _WEIGHED):
+        for _ in range(1 if given else self._rounds):
             basis, triangle = np.linalg.qr((torques / scale).reshape(len(torques), -1).T)
             sizes = lsq_linear(triangle, basis.T @ (self._lacking / scale).ravel(), (low, high)).x
             left = self._lacking - np.tensordot(sizes, torques, axes=1)

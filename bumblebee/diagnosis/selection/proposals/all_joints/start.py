@@ -61,7 +61,7 @@ def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]
         fit = simulated(run.problem, begun)
         run.say(f"{len(fit.chosen)} standard parameters by inverse dynamics: chi-square {fit.power(run.problem):.3g}")
         return fit
-    yield Expecting(len(usual_effects(run.candidates, run.problem.plant.torque_input)))
+    yield Expecting(len(usual_effects(run.candidates)))
     return fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
 
 

@@ -1,4 +1,4 @@
-"""A robot that logs torques and whose model has no friction and no rotors: found by inverse dynamics, then simulated."""
+"""A robot that logs torques, whose model has no friction and no rotors: by inverse dynamics, then simulated."""
 
 from dataclasses import replace
 
@@ -121,7 +121,7 @@ def test_a_robot_a_radian_off_is_brought_to_the_noise() -> None:
 
 
 def _of_wrist(found: dict[tuple[str, str], tuple[float, ...]], what: str) -> np.ndarray:
-    """What effects add to the wrist's inertia or damping (2, 2): with both joints' own, no ratio is the only one."""
+    """Inertia or damping (2, 2) that effects add to the wrist: with both joints' own no ratio is the only one."""
     own = {"armature": "armature", "damping": "viscous_friction"}[what]
     size, ratio = found[f"coupled_{what}", "j3"]
     motor = np.array([ratio, 1.0])
