@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from bumblebee.diagnosis.candidates import all_candidates
 from bumblebee.diagnosis.quick import FirstLook, first_look, told
-from bumblebee.diagnosis.selection import leads
+from bumblebee.diagnosis.selection import Lead, Leads, leads
 from bumblebee.sim.quiet import quiet_mujoco
 from tests.diagnosis import arm, cart
 from tests.diagnosis.strange_arm import simulate
@@ -82,7 +84,17 @@ def test_a_model_that_is_far_off_without_a_lead_is_said_to_be_off_as_a_whole() -
 
 
 def test_a_lead_at_the_end_of_its_range_is_said_to_be_there() -> None:
+    session = arm.session_of(cart.record(count=3), cart.xml())
+    drive = next(c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == "motor_strength")
+    at_its_end = Leads([], [Lead(drive, np.array([1e-3]), 9.0, 0.5)])
+    said = told(replace(first_look(session, CONFIG), leads=at_its_end), WHOLE)
+    assert "motor_strength factor = 0.001, at the end of the values that are tried" in said
+
+
+def test_masses_far_too_light_are_no_drives_without_strength() -> None:
     light = cart.xml().replace('mass="2"', 'mass=".05"').replace('mass=".6"', 'mass=".02"')
     light = light.replace(".01 .01 .001", ".0002 .0002 .0001")
-    said = told(first_look(arm.session_of(cart.record(count=3), light), CONFIG), WHOLE)
-    assert "motor_strength factor = 0.001, at the end of the values that are tried" in said
+    found = first_look(arm.session_of(cart.record(count=3), light), CONFIG).leads.together
+    sizes = {(lead.candidate.effect, lead.candidate.where): float(lead.values[0]) for lead in found}
+    assert sizes["armature", "cart"] == pytest.approx(2.5, rel=0.15)  # both masses ride on the slide
+    assert not any(effect == "motor_strength" for effect, _ in sizes)

@@ -20,7 +20,7 @@ from bumblebee.report.replays import replay_page
 from bumblebee.report.replays.replay import GHOST, Drawn, Part, Take, part, side_by_side
 from bumblebee.report.replays.replay_still import panel
 from bumblebee.report.replays.shape import coarse, shape, surfaces
-from bumblebee.report.replays.windows import window_takes
+from bumblebee.report.replays.windows import SeenWindow, window_takes
 from bumblebee.report.sections.clusters_section import clusters_section
 from bumblebee.robot.model import build_spec
 from tests.diagnosis import cart
@@ -49,6 +49,11 @@ def take(name: str = "one", frames: int = 51, fps: float = 50.0, group: str = "m
         quat[:, 0] += 1.0
         quat /= np.linalg.norm(quat, axis=1, keepdims=True)
     return Take(name, group, states, fps, (Drawn("robot"),), drawn)
+
+
+def test_a_simulation_that_diverged_has_no_number() -> None:
+    seen = SeenWindow("r0", (np.nan, 0.001), np.zeros((1, 3)), np.zeros((3, 1, 1)), 50.0)
+    assert seen.text == "declared model diverged, corrected model 1.0 mrad off"
 
 
 def unpacked(made: Part) -> dict[str, Any]:

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.comparison import Holdout, walds
+from bumblebee.diagnosis.comparison import Holdout, drop_unsure, walds
 from bumblebee.diagnosis.config import SearchConfig
-from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.estimation import Fit, cost_of
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.moves import Terms, refitted
+from bumblebee.diagnosis.selection.proposals.all_joints import is_told_torques, simulated, standard_parameters
 from bumblebee.diagnosis.selection.proposals.gain_grid import far_gains
 from bumblebee.diagnosis.selection.rounds import SINGLE, Kept, Round, ask
 from bumblebee.diagnosis.selection.state import SearchState
@@ -36,9 +37,10 @@ class Leads:
     """Findings of a first look."""
 
     together: list[Lead]
-    """Gains and friction of servos far from the declared ones, by a grid's steps; each explains what all do."""
+    """Effects that were found at once, `what`; each explains what all do."""
     alone: list[Lead]
-    """Single effects where no gains are far off, the best first."""
+    """Single effects where there are none of these, the best first."""
+    what: str = ""
 
 
 def leads(
@@ -58,7 +60,7 @@ def leads(
     run, attempt = SearchState(problem, holdout, remake, config, say), problem.plant.failures.attempt
     gains = attempt("gains far from the declared ones", lambda: far_gains(run), lambda: None)
     if gains is not None:
-        return Leads(_together(run, gains), [])
+        return Leads(_together(run, gains), [], "drives far from the declared ones (sizes to the steps of a grid)")
 
     def shown(effects: Sequence[Effect]) -> tuple[list[Candidate], np.ndarray]:
         candidates, typical = remake(effects)
@@ -69,6 +71,9 @@ def leads(
     now = Round(run)
     ask(now, SINGLE, Kept())
     tried = now.tried if now.looked else [*now.tried, *run.trials()[0]]
+    standard = attempt("standard parameters", lambda: _standard(run, tried), lambda: None)
+    if standard is not None:
+        return Leads(_together(run, standard), [], "standard parameters by inverse dynamics")
     found = []
     cheapest: dict[tuple[str, str], Trial] = {}
     for trial in sorted(tried, key=lambda t: t.cost):
@@ -82,8 +87,21 @@ def leads(
     return Leads([], sorted(found, key=lambda lead: -lead.explains))
 
 
+def _standard(run: SearchState, tried: Sequence[Trial]) -> Fit | None:
+    """Standard parameters where torques are logged and the model is far off, if no trial comes near; only sure ones."""
+    rule = run.problem.thresholds.selection.proposals.all_joints
+    if run.power() < run.config.far or not is_told_torques(run.problem):
+        return None
+    fit = simulated(run.problem, standard_parameters(run.problem, run.candidates, run.config.level))
+    weights = window_weights(fit.clean(run.problem))
+    nearer = rule.nearer * min((t.cost for t in tried), default=np.inf)
+    if cost_of(run.problem, fit.residual, run.weights)[0] >= nearer:
+        return None
+    return drop_unsure(run.problem, fit, weights)
+
+
 def _together(run: SearchState, gains: Fit) -> list[Lead]:
-    """Servos' gains and friction by the grid, joint by joint."""
+    """Effects that were found at once, joint by joint."""
     share = _explains(run, run.fit, gains)
     sizes = walds(run.problem, gains, window_weights(gains.clean(run.problem)), gains.chosen)
     return [Lead(c, gains.of(c), float(z), share) for c, z in zip(gains.chosen, sizes, strict=True)]

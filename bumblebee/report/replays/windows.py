@@ -41,7 +41,11 @@ class SeenWindow:
     def text(self) -> str:
         """How far the models are off."""
         named = zip(("declared model", "corrected model"), self.error, strict=False)
-        return ", ".join(f"{name} {1e3 * error:.1f} mrad off" for name, error in named)
+        return ", ".join(f"{name} {_off(error)}" for name, error in named)
+
+
+def _off(error: float) -> str:
+    return f"{1e3 * error:.1f} mrad off" if np.isfinite(error) else "diverged"
 
 
 def seen_windows(session: Session, effects: Sequence[Effect] = ()) -> list[SeenWindow]:

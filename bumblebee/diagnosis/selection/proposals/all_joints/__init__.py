@@ -15,7 +15,8 @@ where the model, made from a drawing, has none (`begun`); masses of its links co
 that hardly moves is held by dry friction, not by damping (`held_joints`).
 """
 
-from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_told_torques, simulated
+from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.selection.proposals.all_joints.start import (
     all_joints_of,
     begun_with,
@@ -28,6 +29,9 @@ __all__ = [
     "all_joints_of",
     "begun_with",
     "fit_all_joints",
+    "is_told_torques",
+    "simulated",
+    "standard_parameters",
     "start_far_off",
     "start_with_all_joints",
     "whitened_anew",

@@ -8,6 +8,7 @@ import pytest
 
 from bumblebee.diagnosis.candidates import Candidate, all_candidates
 from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.diagnosis.quick import first_look, told
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import CATALOGUE
@@ -118,6 +119,13 @@ def test_a_robot_a_radian_off_is_brought_to_the_noise() -> None:
     error = result.document["error"]
     before, left = (error[kind]["0.2"]["joint_pos_rmse"]["value"] for kind in ("before", "after"))
     assert before > 0.5 and left < 2e-3
+
+
+def test_a_first_look_says_all_sizes() -> None:
+    look = first_look(arm.session_of(rollouts(xml(ROTORS, DRY, VISCOUS), count=4), xml()))
+    found = {(lead.candidate.effect, lead.candidate.where): float(lead.values[0]) for lead in look.leads.together}
+    assert found == pytest.approx(TRUE, rel=0.25)
+    assert "leads, standard parameters by inverse dynamics, explain" in told(look, "bumblebee diagnose")
 
 
 def _of_wrist(found: dict[tuple[str, str], tuple[float, ...]], what: str) -> np.ndarray:
