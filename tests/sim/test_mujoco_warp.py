@@ -38,6 +38,9 @@ EFFECTS = [
     single("command_delay", "left_ankle_pitch_joint", 0.012),
     single("encoder_offset", "waist_yaw_joint", 0.05),
     single("link_mass", "torso_link", 12.0),
+    single("coupled_friction", "left_ankle_roll_joint", 0.5, 0.3, 1.0),
+    single("coupled_damping", "right_ankle_roll_joint", 0.4, -0.8),
+    single("coupled_armature", "left_hip_roll_joint", 0.02, 0.9),
 ]
 
 
