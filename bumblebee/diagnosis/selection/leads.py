@@ -92,7 +92,10 @@ def _standard(run: SearchState, tried: Sequence[Trial]) -> Fit | None:
     rule = run.problem.thresholds.selection.proposals.all_joints
     if run.power() < run.config.far or not is_told_torques(run.problem):
         return None
-    fit = simulated(run.problem, standard_parameters(run.problem, run.candidates, run.config.level))
+    begun = standard_parameters(run.problem, run.candidates, run.config.level)
+    if not begun:
+        return None
+    fit = simulated(run.problem, begun)
     weights = window_weights(fit.clean(run.problem))
     nearer = rule.nearer * min((t.cost for t in tried), default=np.inf)
     if cost_of(run.problem, fit.residual, run.weights)[0] >= nearer:

@@ -31,11 +31,11 @@ def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level
     """Effects and values of regressions on the fitted windows, beside those of drives and beside those of links.
 
     False alarms of what comes in one after the other are held to `level`. What else every robot has, a delay, begins
-    at none.
+    at none. None where no joint moves.
     """
     lacking, robot = lacking_torque(problem), [c for c in candidates if c.effect in USUAL_OF_ROBOT and not c.where]
     every = ([c for c in candidates if CATALOGUE[c.effect].standard in ("joint", k)] for k in ("drive", "link"))
-    begun = (_beside(problem, some, lacking, level) for some in every)
+    begun = (_beside(problem, some, lacking, level) for some in every if any(map(_is_first, some)))
     return [([*chosen, *robot], np.concatenate((values, absent(robot)))) for chosen, values in begun]
 
 
@@ -43,7 +43,7 @@ def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque
     """The joints' effects, and of `every` those that come in beside them."""
     regression = _Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
     least = problem.thresholds.comparison.validation.least_share
-    chosen = [k for k, c in enumerate(every) if CATALOGUE[c.effect].standard == CATALOGUE[c.effect].usual]
+    chosen = [k for k, c in enumerate(every) if _is_first(c)]
     rest = [k for k in range(len(every)) if k not in chosen]
     fit = regression.fit(chosen)
     while rest:
@@ -56,6 +56,11 @@ def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque
             fit = regression.fit(larger.chosen)
             rest = [r for r in rest if not is_chosen(every[r], [every[k]])]
     return _as_values([every[k] for k in fit.chosen], fit.sizes)
+
+
+def _is_first(c: Candidate) -> bool:
+    """Whether every joint has it: its friction, its rotor."""
+    return CATALOGUE[c.effect].standard == "joint" and CATALOGUE[c.effect].usual == "joint"
 
 
 def _as_values(effects: Sequence[Candidate], sizes: np.ndarray) -> Begun:
@@ -104,7 +109,7 @@ class _Regression:
                 asked = np.where(own, lacking.asked.reshape(self._lacking.shape), 0.0)
                 self._torques[k] = c.step[0] * (asked if c.effect == _STRENGTH else np.sign(own) * np.abs(asked))
             if c.effect == _STRENGTH:
-                self._bounds[k] = np.array([[-np.inf], [np.inf]])
+                self._bounds[k] = np.sort((1 - 1 / (1 + c.step[0] * self._bounds[k])) / c.step[0], axis=0)
 
     def fit(self, chosen: Sequence[int], scale: np.ndarray | None = None) -> _Fit:
         """Fit some, by a scale or by that of what they leave."""

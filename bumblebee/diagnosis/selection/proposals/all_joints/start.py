@@ -57,6 +57,8 @@ def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]
     """
     if is_told_torques(run.problem):
         begun = standard_parameters(run.problem, run.candidates, run.config.level)
+        if not begun:
+            return None
         yield Expecting(max(len(chosen) for chosen, _ in begun))
         fit = simulated(run.problem, begun)
         run.say(f"{len(fit.chosen)} standard parameters by inverse dynamics: chi-square {fit.power(run.problem):.3g}")
