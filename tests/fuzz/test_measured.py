@@ -69,7 +69,8 @@ def good_files() -> dict[str, bytes]:
     state = "".join(f'X,{k * 2e4},"{a}","{a}"\n' for k, a in enumerate(lists))
     return {
         "log.csv": f"time,q1,q2,q3,u1,u2,u3,run\n{rows}".encode(),
-        "map.yaml": b"joints: [shoulder, elbow, wrist]\nepisode: run\nscale: {joint_pos: [1, 2, 3]}\ntransmission: {wrist: {wrist: 1, elbow: -1}}\nmeta: {robot: r}\n"
+        "map.yaml": b"joints: [shoulder, elbow, wrist]\nepisode: run\nscale: {joint_pos: [1, 2, 3]}\n"
+        b"transmission: {wrist: {wrist: 1, elbow: -1}}\nmeta: {robot: r}\n"
         b"columns: {joint_pos: [q1, q2, q3], joint_target: [u1, u2, u3]}\n",
         "state_motor.csv": f"type,timestamp,positions,velocities\n{state}".encode(),
         "joint_list.txt": b"shoulder\nelbow\nwrist\n",
