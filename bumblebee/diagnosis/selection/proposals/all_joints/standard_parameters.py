@@ -44,18 +44,23 @@ def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque
     regression = _Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
     least = problem.thresholds.comparison.validation.least_share
     chosen = [k for k, c in enumerate(every) if _is_first(c)]
-    rest = [k for k in range(len(every)) if k not in chosen]
     fit = regression.fit(chosen)
-    while rest:
-        k, gain, share = regression.best(fit, rest)
-        if share < least or gain < chi2.isf(level / len(every), len(every[k].free)):
-            break
-        larger = regression.fit([*fit.chosen, k], fit.scale)
-        rest.remove(k)
-        if larger.cost < (1 - least) * fit.cost:
-            fit = regression.fit(larger.chosen)
-            rest = [r for r in rest if not is_chosen(every[r], [every[k]])]
+    for most in sorted({len(c.free) for c in every}):  # few numbers first: a mass before a centre of mass
+        rest = [k for k, c in enumerate(every) if len(c.free) <= most and _is_open(c, every, fit)]
+        while rest:
+            k, gain, share = regression.best(fit, rest)
+            if share < least or gain < chi2.isf(level / len(every), len(every[k].free)):
+                break
+            larger = regression.fit([*fit.chosen, k], fit.scale)
+            rest.remove(k)
+            if larger.cost < (1 - least) * fit.cost:
+                fit = regression.fit(larger.chosen)
+                rest = [r for r in rest if _is_open(every[r], every, fit)]
     return _as_values([every[k] for k in fit.chosen], fit.sizes)
+
+
+def _is_open(c: Candidate, every: Sequence[Candidate], fit: "_Fit") -> bool:
+    return not is_chosen(c, [every[k] for k in fit.chosen])
 
 
 def _is_first(c: Candidate) -> bool:
