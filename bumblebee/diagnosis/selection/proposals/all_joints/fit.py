@@ -85,8 +85,9 @@ def is_small(problem: Problem) -> bool:
 
 
 def is_told_torques(problem: Problem) -> bool:
-    """Whether inverse dynamics says what a robot lacks: torques are logged, and no ground pushes back."""
-    return problem.plant.torque_input and not problem.plant.floating
+    """Whether inverse dynamics says what a robot lacks: torques of all joints are logged, and no ground pushes back."""
+    plant = problem.plant
+    return plant.torque_input and not plant.floating and bool((plant.actuator >= 0).all())
 
 
 def _of_small(problem: Problem, usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> Fit:
