@@ -19,8 +19,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from benchmarks.undeclared.__main__ import commit, read_lines
 from bumblebee.diagnosis.dataset import open_session
 from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.io.write import write_file
 from bumblebee.measured.rollout import Rollout, write_rollout
 from bumblebee.sim.effects import Effect
 
@@ -168,12 +170,12 @@ def within(found: list[Effect], case: Case) -> tuple[int, int]:
 
 def measured(case: Case, folder: Path) -> dict[str, Any]:
     """Diagnose one case, whose logs are made where they are not there yet."""
-    if not (folder / "model.xml").exists():
-        (folder / "rollouts").mkdir(parents=True, exist_ok=True)
-        none, model = np.zeros(6), truth_of(case)
-        for number in range(RUNS):
-            write_rollout(folder / "rollouts" / f"r{number}.parquet", run_of(model, case, number))
-        (folder / "model.xml").write_text(model_of(none if case.rubs else ARMATURE, none, none))
+    (folder / "rollouts").mkdir(parents=True, exist_ok=True)
+    none, model = np.zeros(6), truth_of(case)
+    for number in range(RUNS):
+        if not (place := folder / "rollouts" / f"r{number}.parquet").exists():
+            write_rollout(place, run_of(model, case, number))
+    write_file(folder / "model.xml", model_of(none if case.rubs else ARMATURE, none, none))
     began = time.monotonic()
     result = diagnose(open_session(folder / "model.xml", folder))
     error = result.document["error"]
@@ -198,12 +200,12 @@ def main() -> None:
     mujoco.set_mju_user_warning(lambda text: None)
     options.out.mkdir(parents=True, exist_ok=True)
     results = options.out / "results.jsonl"
-    done = {json.loads(line)["case"] for line in results.read_text().splitlines()} if results.exists() else set()
+    rows = read_lines(results) if results.exists() else []
     for number, (name, case) in enumerate(CASES.items()):
-        if name not in done:
-            row = {"case": name} | measured(case, options.out / f"case_{number}")
-            with results.open("a") as out:
-                out.write(json.dumps(row) + "\n")
+        if name not in {row["case"] for row in rows}:
+            row = {"case": name, "commit": commit()} | measured(case, options.out / f"case_{number}")
+            rows.append(row)
+            write_file(results, "".join(json.dumps(one) + "\n" for one in rows))
             print(json.dumps(row), flush=True)
 
 

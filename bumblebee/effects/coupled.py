@@ -6,6 +6,7 @@ damping and inertia. Of what is linear in the motion, motors of the sum and of t
 the joints' own beside one of the two; of dry friction they are.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any
 
@@ -22,12 +23,12 @@ from bumblebee.errors import BadInput
 _OF_ONE_ANGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 
-def ratio(least: float) -> Parameter:
+def ratio_from(least: float) -> Parameter:
     """How far a motor turns with the joint before, of how far with its own."""
     return Parameter("ratio", "", least, 20.0, 1.0, matters=0.1)
 
 
-class Coupled(Kind):
+class Coupled(Kind, ABC):
     """An effect of motors that turn with a joint and the one before it."""
 
     ways: tuple[float, ...] = (1.0,)
@@ -60,21 +61,22 @@ class Coupled(Kind):
     def steps(self, on: OnJoint) -> Iterator[Step]:
         """Both motors at once, or one for the sum and one for the difference, after a driven joint that moves."""
         motors = len(self.ways)
-        for sign in (1.0, -1.0) if on.before and motors == 1 else (1.0,) * bool(on.before):
+        signs = (1.0, -1.0) if motors == 1 else (1.0,)
+        for sign in signs if on.before else ():
             sizes = (self.size(on),) * motors
             yield Step((*sizes, sign), free=tuple(range(motors)), start=(0.0,) * (motors + 1), shape=1.0)
 
+    @abstractmethod
     def give(self, tendon: Any, size: float) -> None:
         """Give it to a tendon of a spec."""
-        raise NotImplementedError
 
+    @abstractmethod
     def sizes(self, model: mujoco.MjModel) -> np.ndarray:
         """Its sizes on a model's tendons."""
-        raise NotImplementedError
 
+    @abstractmethod
     def size(self, on: OnJoint) -> float:
         """A first step of what either motor has."""
-        raise NotImplementedError
 
     def felt(self, along: Any, j: int) -> np.ndarray:
         """(W, K) what of a joint's motion it answers to."""

@@ -8,13 +8,14 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.comparison import Holdout, drop_unsure, walds
 from bumblebee.diagnosis.config import SearchConfig
-from bumblebee.diagnosis.estimation import Fit, cost_of
+from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.moves import Terms, refitted
-from bumblebee.diagnosis.selection.proposals.all_joints import is_told_torques, simulated, standard_parameters
+from bumblebee.diagnosis.selection.proposals.all_joints import all_joints_of, is_nearer, is_told_torques
 from bumblebee.diagnosis.selection.proposals.gain_grid import far_gains
 from bumblebee.diagnosis.selection.rounds import SINGLE, Kept, Round, ask
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.steps import go
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.sim.effects import Effect
 
@@ -89,18 +90,12 @@ def leads(
 
 def _standard(run: SearchState, tried: Sequence[Trial]) -> Fit | None:
     """Standard parameters where torques are logged and the model is far off, if no trial comes near; only sure ones."""
-    rule = run.problem.thresholds.selection.proposals.all_joints
     if run.power() < run.config.far or not is_told_torques(run.problem):
         return None
-    begun = standard_parameters(run.problem, run.candidates, run.config.level)
-    if not begun:
+    fit = go(run, all_joints_of)
+    if fit is None or not is_nearer(run, fit, tried):
         return None
-    fit = simulated(run.problem, begun)
-    weights = window_weights(fit.clean(run.problem))
-    nearer = rule.nearer * min((t.cost for t in tried), default=np.inf)
-    if cost_of(run.problem, fit.residual, run.weights)[0] >= nearer:
-        return None
-    return drop_unsure(run.problem, fit, weights)
+    return drop_unsure(run.problem, fit, window_weights(fit.clean(run.problem)))
 
 
 def _together(run: SearchState, gains: Fit) -> list[Lead]:

@@ -78,9 +78,7 @@ def answers_of(
     With `only` on these alone, (some of nv,); the others' answers are left at zero.
     """
     pushed = np.arange(plant.model.nv) if only is None else only
-    count = max(1, int(np.ceil(windows.span / step - 1e-6)))
-    control = inputs_of(windows, variation, step, count, {})
-    edges = np.unique(np.linspace(0, count, min(segments, count) + 1).round().astype(int))
+    control, edges = commanded(windows, variation, step, segments)
     models, size = [with_step(model, step) for model in variation.models], len(windows)
     with without(models, out_of_reach(plant, windows)):  # a batch runs on a copy
         plain, batch = (own_batch(plant, windows, variation, copies) for copies in (1, len(pushed)))
@@ -103,6 +101,13 @@ def answers_of(
         change[pushed, s] = difference(layout, moved, moved_quat, np.broadcast_to(base, moved.shape), same)
     change /= sizes[:, None, None, None, None]
     return Answers(path, np.nan_to_num(change))
+
+
+def commanded(windows: Windows, variation: Variation, step: float, segments: int) -> tuple[np.ndarray, np.ndarray]:
+    """Controls (W, K, nu) of the windows' K steps, and the steps (S + 1,) at which segments begin and end."""
+    count = max(1, int(np.ceil(windows.span / step - 1e-6)))
+    edges = np.unique(np.linspace(0, count, min(segments, count) + 1).round().astype(int))
+    return inputs_of(windows, variation, step, count, {}), edges
 
 
 def _free_path(

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.sensitivities.impulse_responses import Path
+from bumblebee.diagnosis.sensitivities.impulse_responses import Path, commanded
 from bumblebee.diagnosis.sensitivities.torque_signatures import Signatures
-from bumblebee.diagnosis.simulation import inputs_of, vary
+from bumblebee.diagnosis.simulation import vary
 from bumblebee.diagnosis.thresholds.sensitivities import Impulses
 
 
@@ -44,9 +44,8 @@ def lacking_torque(problem: Problem) -> LackingTorque:
 def _measured_path(problem: Problem, rule: Impulses) -> Path:
     """The windows as they were measured, between ticks on straight lines."""
     plant, windows, step = problem.plant, problem.windows, problem.coarse
-    count = max(1, int(np.ceil(windows.span / step - 1e-6)))
-    control = inputs_of(windows, vary(plant, []), step, count, {})
-    edges = np.unique(np.linspace(0, count, min(rule.segments, count) + 1).round().astype(int))
+    control, edges = commanded(windows, vary(plant, []), step, rule.segments)
+    count = control.shape[1]
     qpos = np.repeat(windows.qpos[:, None], count + 1, axis=1)
     qvel = np.repeat(windows.qvel[:, None], count + 1, axis=1)
     at = step * np.arange(count + 1)

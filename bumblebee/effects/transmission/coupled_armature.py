@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bumblebee.effects.coupled import Coupled, joint_before, ratio
+from bumblebee.effects.coupled import Coupled, ratio_from
 from bumblebee.effects.kind import INF, Parameter
 from bumblebee.effects.places import OnJoint, Step
 
@@ -22,7 +22,7 @@ class CoupledArmature(Coupled):
     """
 
     rank = 166
-    parameters = (Parameter("armature", "kg m^2", 0.0, INF), ratio(-20.0))
+    parameters = (Parameter("armature", "kg m^2", 0.0, INF), ratio_from(-20.0))
     experiment = "accelerate both joints together, then against each other"
 
     def give(self, tendon: Any, size: float) -> None:
@@ -32,7 +32,7 @@ class CoupledArmature(Coupled):
         return model.tendon_armature
 
     def steps(self, on: OnJoint) -> Iterator[Step]:
-        if on.before and not _parallel(on.spot.model, on.spot.place):
+        if on.before and not _parallel(on.spot.model, on.spot.place, on.before):
             yield from super().steps(on)
 
     def size(self, on: OnJoint) -> float:
@@ -42,9 +42,9 @@ class CoupledArmature(Coupled):
         return along.a[..., j]
 
 
-def _parallel(model: mujoco.MjModel, name: str) -> bool:
-    """Whether a joint and the one before it turn about parallel axes."""
+def _parallel(model: mujoco.MjModel, *joints: str) -> bool:
+    """Whether two joints turn about parallel axes."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    one, other = (data.xaxis[model.joint(joint).id] for joint in (name, joint_before(model, name)))
+    one, other = (data.xaxis[model.joint(joint).id] for joint in joints)
     return bool(abs(one @ other) > _PARALLEL)

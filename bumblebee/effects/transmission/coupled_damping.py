@@ -5,7 +5,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bumblebee.effects.coupled import Coupled, ratio
+from bumblebee.effects.coupled import Coupled, ratio_from
 from bumblebee.effects.kind import INF, Parameter
 from bumblebee.effects.places import OnJoint
 
@@ -17,7 +17,7 @@ class CoupledDamping(Coupled):
     """
 
     rank = 164
-    parameters = (Parameter("damping", "N m s/rad", 0.0, INF), ratio(-20.0))
+    parameters = (Parameter("damping", "N m s/rad", 0.0, INF), ratio_from(-20.0))
     experiment = "move both joints together, then against each other, at several speeds"
 
     def give(self, tendon: Any, size: float) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bumblebee.effects.coupled import Coupled, ratio
+from bumblebee.effects.coupled import Coupled, ratio_from
 from bumblebee.effects.kind import INF, Parameter
 from bumblebee.effects.mjcf import STICTION_ITERATIONS, STICTION_SOLIMP, STICTION_SOLREF
 from bumblebee.effects.places import OnJoint
@@ -18,7 +18,7 @@ class CoupledFriction(Coupled):
     """
 
     rank = 162
-    parameters = (Parameter("sum", "N m", 0.0, INF), Parameter("difference", "N m", 0.0, INF), ratio(0.05))
+    parameters = (Parameter("sum", "N m", 0.0, INF), Parameter("difference", "N m", 0.0, INF), ratio_from(0.05))
     ways = (1.0, -1.0)
     experiment = "move both joints together, then against each other, at the same speeds"
 

@@ -23,6 +23,10 @@ torque [N m]. Constant gains become metadata; the others become part of the targ
 NAMED: dict[str, int | str] = WIDTHS | DRIVE
 """Every column that a map may name -> its values a row."""
 
+MOVES = ("joint_pos", "joint_vel", "joint_target", "target_vel")
+FORCES = ("joint_torque", "joint_torque_cmd", "feed_forward")
+"""Columns in the joints' units, and columns of torques; all have one value a joint."""
+
 COMMANDED = ("joint_target", "joint_torque_cmd", "action", *DRIVE)
 """Columns that are in force until the next command; all others are sampled states."""
 

@@ -14,6 +14,7 @@ from bumblebee.measured.importers.column_map import (
     CLOCKS,
     LAYOUTS,
     LEFT_OUT,
+    MOVES,
     NAMED,
     SECONDS,
     UNCOMMANDED,
@@ -38,7 +39,6 @@ LEROBOT = {
     "episode": "episode_index",
 }
 """Columns of LeRobot's datasets, v2 and v3."""
-_IN_ANGLES = ("joint_pos", "joint_vel", "joint_target", "target_vel")
 
 
 def read_map(path: Path, kind: str = "csv") -> ColumnMap:
@@ -179,7 +179,7 @@ def _require_scales(path: Path, chosen: ColumnMap) -> None:
     """Require that normalised columns have factors to rad in the map."""
     if "normalised" not in chosen.angle_unit:
         return
-    for column in _IN_ANGLES:
+    for column in MOVES:
         if column in chosen.columns and column not in chosen.scale:
             do = "The span of the joint's calibration [rad] over that of the values; offset has the angle at 0."
             raise BadInput(f"{path}: scale", f"factors of {column} to rad, as its unit is normalised", "none", do)

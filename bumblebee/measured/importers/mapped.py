@@ -6,14 +6,13 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.measured.importers.clock import require_clock, takes
-from bumblebee.measured.importers.column_map import ANGLE_FACTORS, LEFT_OUT, NAMED, ColumnMap
+from bumblebee.measured.importers.column_map import ANGLE_FACTORS, LEFT_OUT, MOVES, NAMED, ColumnMap
 from bumblebee.measured.importers.drive import Stretch, stretches
 from bumblebee.measured.importers.source import NO_VELOCITY, differences, measured_rate
 from bumblebee.measured.importers.transmission import through
 from bumblebee.measured.pauses import SHORTEST
 from bumblebee.measured.rollout import COMMANDS, WIDTHS, Rollout
 
-_ANGULAR = ("joint_pos", "joint_vel", "joint_target", "target_vel")
 _NEEDED = ("joint_pos", *COMMANDS)
 
 
@@ -102,7 +101,7 @@ def _with_numbers(
 def _turned(column: str, value: np.ndarray, chosen: ColumnMap) -> np.ndarray:
     """A column (T, width) in the contract's units and order."""
     with np.errstate(all="ignore"):  # what is too large is a finding of the checks, with its row
-        if column in _ANGULAR and set(chosen.angle_unit) - {"rad", "m"}:
+        if column in MOVES and set(chosen.angle_unit) - {"rad", "m"}:
             value = value * np.array([ANGLE_FACTORS[unit] for unit in chosen.angle_unit])
         if column == "base_ang_vel":
             value = value * ANGLE_FACTORS[chosen.gyro_unit]

@@ -58,6 +58,9 @@ def _require_commands(path: Path, chosen: ColumnMap, model: mujoco.MjModel | Non
             where, came = f"{path}: columns: {column}", repr(LEFT_OUT)
             if joint == LEFT_OUT:
                 continue
+            if joint in _motors(chosen):
+                do = f"Name it; {came} is for joints without an actuator."
+                raise BadInput(where, f"the column of the motor in the place of {joint}, under transmission", came, do)
             if driven is None:
                 expected = f"the declared model beside {came}, which says that {joint} has no actuator"
                 raise BadInput(where, expected, "none", "Give the model: --model.")
@@ -66,10 +69,15 @@ def _require_commands(path: Path, chosen: ColumnMap, model: mujoco.MjModel | Non
                 raise BadInput(where, f"the column of {joint}, which an actuator of the model drives", came, do)
 
 
+def _motors(chosen: ColumnMap) -> set[str]:
+    """Joints in whose place a motor stands that turns several."""
+    return {motor for row in chosen.transmission.values() for motor in row}
+
+
 def _require_units(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:
     """A map that states no unit has the contract's, rad and m."""
     units = chosen.angle_unit * (len(chosen.joints) if len(chosen.angle_unit) == 1 else 1)
-    turned = {motor for row in chosen.transmission.values() for motor in row}  # a motor's unit, not a joint's
+    turned = _motors(chosen)  # their units are not the joints'
     for joint, unit in zip(chosen.joints, units, strict=False):
         if joint == LEFT_OUT or joint in turned:
             continue

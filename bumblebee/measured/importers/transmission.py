@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.importers.column_map import LEFT_OUT, ColumnMap
+from bumblebee.measured.importers.column_map import FORCES, LEFT_OUT, MOVES, ColumnMap
 
-MOVES = ("joint_pos", "joint_vel", "joint_target", "target_vel")
-FORCES = ("joint_torque", "joint_torque_cmd", "feed_forward")
 _LARGEST = 1e9
 _SINGULAR = 1e-6
 """Least singular value of the matrix as a share of the largest: below it a motor moves nothing."""
@@ -49,9 +47,9 @@ def refuse_gains(where: str, chosen: ColumnMap) -> None:
     """`BadInput` for gains of motors that turn with several joints: no servo of a joint has them."""
     given = [key for key in ("kp", "kd") if key in chosen.columns or key in chosen.meta]
     if chosen.transmission and given:
-        do = f"Take {given[0]} out of the map, and declare the joints' own gains in the model."
+        do = f"Take {given[0]} out of the map (it may come with a layout), and declare the joints' gains in the model."
         raise BadInput(
-            f"{where}: {given[0]}", "none beside transmission: they are a motor's, not a joint's", "some", do
+            f"{where}: {given[0]}", "no gains beside transmission: they are a motor's, not a joint's", given[0], do
         )
 
 

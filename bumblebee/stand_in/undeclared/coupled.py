@@ -86,12 +86,11 @@ def _linear(law: Callable[[str, str, float, float], Law], name: str) -> Callable
 
 KINDS = (
     Kind("coupled_friction", "pair", _rubs(CoupledFriction),
-         first=lambda p: 0.01 * p.of(p.robot.limit), most=lambda p: 0.15 * p.of(p.robot.limit),
-         fault=lambda p: 0.15 * p.of(p.robot.limit), robots="arm", unit="N m"),
+         first=lambda p: 0.01 * p.of(p.robot.limit), most=lambda p: 0.15 * p.of(p.robot.limit), robots="arm",
+         unit="N m"),
     Kind("coupled_damping", "pair", _linear(CoupledDamping, "damping"),
-         first=lambda p: 0.03 * p.of(p.robot.kd), most=lambda p: p.of(p.robot.kd),
-         fault=lambda p: p.of(p.robot.kd), robots="arm", unit="N m s/rad"),
+         first=lambda p: 0.03 * p.of(p.robot.kd), most=lambda p: p.of(p.robot.kd), robots="arm", unit="N m s/rad"),
     Kind("coupled_armature", "crossed", _linear(CoupledArmature, "armature"),
-         first=lambda p: 0.2 * p.of(p.robot.armature), most=lambda p: 4.0 * p.of(p.robot.armature),
-         fault=lambda p: 4.0 * p.of(p.robot.armature), robots="arm", unit="kg m^2"),
+         first=lambda p: 0.2 * p.of(p.robot.armature), most=lambda p: 4.0 * p.of(p.robot.armature), robots="arm",
+         unit="kg m^2"),
 )  # fmt: skip

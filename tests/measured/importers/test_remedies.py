@@ -8,13 +8,13 @@ from tempfile import TemporaryDirectory
 import pytest
 
 import bumblebee.measured
-from tests.measured.importers.remedies import arrays, recordings, tables
+from tests.measured.importers.remedies import arrays, motors, recordings, tables
 from tests.measured.importers.remedies.walk import recorded, walk
 
 pytest.importorskip("mcap_ros2")
 pytest.importorskip("h5py")
 
-CASES = {case.name: case for case in (*tables.CASES, *arrays.CASES, *recordings.CASES)}
+CASES = {case.name: case for case in (*tables.CASES, *motors.CASES, *arrays.CASES, *recordings.CASES)}
 HOME = Path(bumblebee.measured.__file__).parent
 SOURCES = (*sorted((HOME / "importers").rglob("*.py")), HOME / "tables.py", HOME / "csv_faults.py")
 NOT_WALKED = {"extras.py"}

@@ -65,7 +65,7 @@ def test_joints_follow_from_motors_and_the_power_stays(tmp_path: Path, log: dict
         ("transmission: {pitch: {roll: true}}\n", "a number"),
         ("transmission: {pitch: {pitch: 1, roll: 1}, roll: {pitch: 2, roll: 2}}\n", "singular"),
         ("transmission: {pitch: {roll: 1}}\n", "singular"),
-        (f"{DIFFERENTIAL}meta: {{kp: [40, 40, 40]}}\n", "declare the joints' own gains"),
+        (f"{DIFFERENTIAL}meta: {{kp: [40, 40, 40]}}\n", "declare the joints' gains"),
     ],
 )
 def test_a_transmission_that_cannot_be_is_refused(tmp_path: Path, log: object, said: str, names: str) -> None:

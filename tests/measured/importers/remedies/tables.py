@@ -293,16 +293,4 @@ CASES = (
     Case("no model of a locked joint", with_columns(joints=["hip", "_"], locked=["knee"]), "Give it", option),
     Case("a driven joint out", with_columns(joints=["hip", "_"], options=("--model",)), "under locked", locked),
     Case("a dead motor", dead_motor, "kp 0 of knee", locked),
-    Case(
-        "two joints of one motor",
-        with_columns(transmission={"hip": {"hip": 1.0, "knee": 1.0}, "knee": {"hip": 2.0, "knee": 2.0}}),
-        "no two joints the same factors",
-        lambda a, line: a.map["transmission"].update(knee={"hip": 1.0, "knee": -1.0}),
-    ),
-    Case(
-        "a motor's gains",
-        with_columns(transmission={"hip": {"hip": 1.0, "knee": 1.0}}, meta={"kp": [40, 40]}),
-        "Take kp out of the map",
-        lambda a, line: a.map["meta"].pop("kp"),
-    ),
 )

@@ -12,14 +12,15 @@ that took no part; these and the fitted ones are then whitened anew, and the sea
 the place of gains far from the declared ones (`gain_grid`), and on a robot far from the data where they leave next to
 nothing and no effect that was tried by itself comes near. A large robot's rotors and friction begin at likely sizes
 where the model, made from a drawing, has none (`begun`); masses of its links come in by slopes (`loads`), and a joint
-that hardly moves is held by dry friction, not by damping (`held_joints`).
+that hardly moves is held by dry friction, not by damping (`held_joints`). Where torques are logged and the base is
+fixed none of this is asked: a regression says where to begin (`standard_parameters`).
 """
 
-from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_told_torques, simulated
-from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_told_torques
 from bumblebee.diagnosis.selection.proposals.all_joints.start import (
     all_joints_of,
     begun_with,
+    is_nearer,
     start_far_off,
     start_with_all_joints,
     whitened_anew,
@@ -29,9 +30,8 @@ __all__ = [
     "all_joints_of",
     "begun_with",
     "fit_all_joints",
+    "is_nearer",
     "is_told_torques",
-    "simulated",
-    "standard_parameters",
     "start_far_off",
     "start_with_all_joints",
     "whitened_anew",

@@ -85,9 +85,12 @@ def is_small(problem: Problem) -> bool:
 
 
 def is_told_torques(problem: Problem) -> bool:
-    """Whether inverse dynamics says what a robot lacks: torques of all joints are logged, and no ground pushes back."""
+    """Whether inverse dynamics says what a robot lacks: torques are logged, and no ground pushes back.
+
+    Without any drive nothing says how heavy the links are.
+    """
     plant = problem.plant
-    return plant.torque_input and not plant.floating and bool((plant.actuator >= 0).all())
+    return plant.torque_input and not plant.floating and bool((plant.actuator >= 0).any())
 
 
 def _of_small(problem: Problem, usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> Fit:

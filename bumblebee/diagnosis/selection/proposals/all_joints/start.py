@@ -109,13 +109,19 @@ def start_far_off(run: SearchState, tried: Sequence[Trial]) -> Asking[bool]:
     little = rule.next_to_nothing if small else rule.little_of_large
     if fit is None or fit.power(run.problem) >= max(rule.still_off, little * declared):
         return False
-    least = min((t.cost for t in tried), default=np.inf)
-    if cost_of(run.problem, fit.residual, run.weights)[0] >= rule.nearer * least:
+    if not is_nearer(run, fit, tried):
         return False
     if not compare(run.problem, run.holdout, run.fit, fit).passes(run.problem.thresholds.comparison.together):
         return False
     yield begun_with(run, fit)
     return True
+
+
+def is_nearer(run: SearchState, fit: Fit, tried: Sequence[Trial]) -> bool:
+    """Whether a fit of many effects leaves a share of what the best of some trials of single ones leaves."""
+    nearer = run.problem.thresholds.selection.proposals.all_joints.nearer
+    least = min((t.cost for t in tried), default=np.inf)
+    return cost_of(run.problem, fit.residual, run.weights)[0] < nearer * least
 
 
 def _is_worth_minutes(run: SearchState, tried: Sequence[Trial]) -> bool:
