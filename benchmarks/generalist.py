@@ -2,7 +2,7 @@
 
 `python -m benchmarks.generalist --out results.jsonl`: each arm learns by DAgger to do what the shipped policy does on
 the embedded motions, and is then tried on every one from its first frame. Cases that the file has are not run again;
-one that was cut off goes on. Experts of real motions are distilled by `benchmarks.study run generalist`.
+one that was cut off goes on. Experts of real motions are distilled by `benchmarks.method`.
 """
 
 import argparse

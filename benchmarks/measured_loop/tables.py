@@ -8,7 +8,7 @@ import pandas as pd
 
 from benchmarks.measured_loop.settings import ARMS
 from benchmarks.measured_loop.work import CARD, TRIED
-from benchmarks.study.pages.tables import cell, head, line, rate, relative, signed
+from benchmarks.study.tables import cell, head, line, rate, relative, signed
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.intervals import mean_by_motion, motion_means, sign_flip_test
 from bumblebee.learning.delta import Gain, compare

@@ -9,8 +9,8 @@ from benchmarks.method.places import BASE, OWN
 from benchmarks.method.settings import NAMED, Method, chosen
 from benchmarks.method.tables import ROWS, read
 from benchmarks.study.motions import Motions
-from benchmarks.study.pages.tables import SPLITS, difference, head, line, methods_table, rate, signed
 from benchmarks.study.settings import freeze, frozen
+from benchmarks.study.tables import SPLITS, difference, head, line, methods_table, rate, signed
 from bumblebee.errors import BadInput
 
 LEARNERS = {"world_model": "through a model", "ppo": "PPO", "small": "in seconds"}

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field, replace
 
 from benchmarks.baselines.methods import OURS
-from benchmarks.study.settings import Distilling
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.delta import DeltaConfig, RegressionConfig
@@ -25,6 +24,22 @@ TASK = EnvConfig(
     threshold_share=0.4,
 )
 """The task of docs/training.md, "Levels", with the paper's randomisation."""
+
+
+@dataclass(frozen=True)
+class Distilling:
+    """Settings that all students share."""
+
+    iterations: int = 4000
+    worlds: int = 4096
+    steps: int = 2
+    """Control steps of each world an iteration."""
+    rate: float = 3e-4
+    """Adam's."""
+    capacity: int = 10_000_000
+    """Samples that are kept."""
+    margin: float = 0.05
+    """Nothing reads it since the first study left; it is in the hash of the settings that pages of results name."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from benchmarks.method.places import ARMS, BASE, GENERAL, LONGER, ONE, OWN, RAND
 from benchmarks.method.settings import Method
 from benchmarks.method.students import AHEAD, changed, compared
 from benchmarks.study.motions import Motions
-from benchmarks.study.pages.tables import (
+from benchmarks.study.tables import (
     RATES,
     SPLITS,
     cell,

@@ -15,7 +15,6 @@ from benchmarks.method.settings import Method
 from benchmarks.method.students import is_student
 from benchmarks.study.motions import Motions
 from benchmarks.study.on_robot import write_csv
-from benchmarks.study.robots import RobotsConfig
 from benchmarks.study.sealed_trials import chosen_clips, follow_sealed
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.rollout import Manner
@@ -60,7 +59,7 @@ class Trying:
         """The shard's part of the robots' motions, from readings, on a sealed robot."""
         mujoco.set_mju_user_warning(lambda text: None)  # a robot that falls apart is a fall
         effects = read_sealed(self.robots / f"{robot}.json")
-        clips = chosen_clips(self.motions, RobotsConfig(max_seconds=self.method.max_seconds))
+        clips = chosen_clips(self.motions, self.method.max_seconds)
         base = self.method.tried_base
         table = self._each(who, shard, clips, lambda *one: follow_sealed(*one, effects, base))
         write_csv(self.out / who / f"sealed-{robot}-{shard}.csv", table.assign(robot=robot))

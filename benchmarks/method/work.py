@@ -12,8 +12,7 @@ from benchmarks.method.settings import NAMED, chosen
 from benchmarks.method.training import Training
 from benchmarks.method.trying import Trying
 from benchmarks.study.motions import read_motions
-from benchmarks.study.steps import GOES_ON
-from benchmarks.study.training import deadline
+from benchmarks.study.steps import GOES_ON, deadline
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.retarget.table import markdown, summary
 from bumblebee.motion.filters.quality import TOLERANCE, TOUCHES, at_times
 from bumblebee.motion.human.motion import HumanMotion
-from bumblebee.motion.reading.listing import find_motions
+from bumblebee.motion.reading.files import find_motions
 from bumblebee.motion.retarget.collision import depths, obstacles, shape_heights
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.mapping import CORNERS, Robot, read_robot, this_robot

@@ -23,7 +23,7 @@ from bumblebee.motion.formats.convert import clip_of
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.raw import RawMotion
-from bumblebee.motion.reading.listing import find_motions
+from bumblebee.motion.reading.files import find_motions
 from bumblebee.motion.resample import resample
 from bumblebee.progress import progress
 

@@ -15,7 +15,7 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.filters.quality import at_times
 from bumblebee.motion.formats.convert import clip_of
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
-from bumblebee.motion.reading.listing import find_motions
+from bumblebee.motion.reading.files import find_motions
 from bumblebee.motion.retarget.retarget import retarget
 from bumblebee.report.films.playback import pictures
 

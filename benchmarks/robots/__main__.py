@@ -14,7 +14,7 @@ import pandas as pd
 
 from benchmarks.method.places import BASE
 from benchmarks.method.settings import NAMED
-from benchmarks.study.pages.tables import RATES, SPLITS, cell, difference, estimate, head, line, rate, signed
+from benchmarks.study.tables import RATES, SPLITS, cell, difference, estimate, head, line, rate, signed
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.intervals import Estimate
 from bumblebee.io.write import write_file

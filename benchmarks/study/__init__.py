@@ -1,9 +1,9 @@
-"""The study of the paper's claims: experts, controls at equal steps, and tables with intervals.
+"""Motions, sealed robots and tables that several benchmarks share; left of the first study of the paper's claims.
 
-    python -m benchmarks.study prepare G1_MOVES ASAP_G1 CMU_BVH --texts HUMANML3D --out study/motions
-    python -m benchmarks.study run experts --motions study/motions --out study/experts --gpus 2 --minutes 9
-    python -m benchmarks.study table experts study/experts --motions study/motions --out experts.md
+    python -m benchmarks.study prepare G1_MOVES ASAP_SMPL CMU_BVH --texts HUMANML3D --out motions
+    python -m benchmarks.study.robots run/base --motions motions --out robots
 
 `prepare` needs the motions' sources and a text encoder, and writes plain files; everything after it runs where only
-torch, MuJoCo and this library are. Training can be killed or ended by `--minutes`: the same command goes on.
+torch, MuJoCo and this library are. The study itself is of commit 21719608; since then `benchmarks.method` runs the
+paper's method and its controls.
 """

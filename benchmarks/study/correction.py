@@ -17,7 +17,7 @@ class Correction:
 
     diagnosis: Path | None = None
     delta: Path | None = None
-    """Used whether or not it beat none: the study asks what it is worth."""
+    """Used whether or not it beat none: the benchmarks ask what it is worth."""
 
     @property
     def model(self) -> Path | None:

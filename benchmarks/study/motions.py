@@ -1,4 +1,4 @@
-"""The study's motions: read from their sources, held out by name, filtered, cut and clustered."""
+"""Motions of a benchmark: read from their sources, held out by name, filtered, cut and clustered."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.motion_pack import Packed, read_pack, write_pack
-from benchmarks.study.settings import sha256
 from bumblebee.clustering.config import ClusterConfig
 from bumblebee.errors import BadInput
+from bumblebee.io.read import file_hash
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import DescribeConfig
 from bumblebee.motion.filters.rules import filter_clips
@@ -37,10 +37,9 @@ class Motions:
         """Names in order, the slowest motions first."""
         return sorted(self.labels["cluster"].unique())
 
-    def training(self, names: Sequence[str] | None = None) -> list[Packed]:
-        """Pieces to learn from; those among `names`, if given."""
-        wanted = None if names is None else set(names)
-        return [r for r in self.rows if r.clip.split == "train" and (wanted is None or r.clip.name in wanted)]
+    def training(self) -> list[Packed]:
+        """Pieces to learn from."""
+        return [row for row in self.rows if row.clip.split == "train"]
 
     def cluster_indices(self, clips: Sequence[Clip], random: int | None = None) -> list[int]:
         """The index of each clip's cluster in `clusters`; of its random cluster by this seed, if there is one."""
@@ -125,7 +124,7 @@ def read_motions(folder: Path) -> Motions:
     for name, count in few.items():
         if count < 2:
             raise BadInput(f"{folder / LABELS}: cluster {name}", "at least 2 motions to learn from", str(count))
-    return Motions(clips, labels, sha256(folder / MOTIONS)[:12] + sha256(folder / LABELS)[:12])
+    return Motions(clips, labels, file_hash(folder / MOTIONS)[:12] + file_hash(folder / LABELS)[:12])
 
 
 def _told(summary: dict) -> list[str]:

@@ -22,7 +22,7 @@ KEY = "policy"
 
 
 def exported(policy: Path, folder: Path) -> Path:
-    """The policy of a study's folder as robots run it, in `folder`, a new one."""
+    """The policy of a folder as robots run it, in `folder`, a new one."""
     folder.mkdir(parents=True)
     export_policy(folder, load_policy(policy))
     return folder

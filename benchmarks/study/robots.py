@@ -1,6 +1,6 @@
-"""Three sealed stand-in robots on which the study's base policy loses about half of what it follows.
+"""Three sealed stand-in robots on which a base policy loses about half of what it follows.
 
-    python -m benchmarks.study.robots study/run/s0-base --motions study/motions --out study/robots
+    python -m benchmarks.study.robots run/base --motions motions --out robots
 
 A robot's effects, their kinds, places and relative sizes, are drawn by a frozen seed: one of the ground, one that no
 catalogue has, three of the catalogue. One factor on all sizes is then searched by bisection until the policy's success
@@ -29,9 +29,10 @@ import numpy as np
 
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.on_robot import KEY, exported, run_on_robot
-from benchmarks.study.settings import SMALL, Study, freeze, sha256
+from benchmarks.study.settings import freeze
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.thinning import thin
+from bumblebee.io.read import file_hash
 from bumblebee.io.write import write_file
 from bumblebee.motion.clip import Clip
 from bumblebee.policy.episodes import Episode
@@ -178,16 +179,13 @@ def trial(
     return np.array(ends), np.array([rollout.duration for rollout in rollouts])
 
 
-def seal_robots(
-    policy: Path, motions: Motions, config: RobotsConfig, out: Path, study: Study, threads: int
-) -> list[Path]:
+def seal_robots(policy: Path, motions: Motions, config: RobotsConfig, out: Path, threads: int) -> list[Path]:
     """Search and seal what is not sealed yet; the files, the declared robot's first.
 
     Raises:
         BadInput: if `out` was begun with other settings, or the policy follows too little, or no robot is taken.
     """
-    used = sha256(policy / "policy.pt")
-    freeze(out, study, robots=asdict(config), policy=used, motions=motions.hash)
+    freeze(out, config, policy=file_hash(policy / "policy.pt"), motions=motions.hash)
     paths = [out / DECLARED, *(out / f"{config.name}-{i}.json" for i in range(len(config.seeds)))]
     if not paths[0].exists():
         write_file(paths[0], _plain(_content([])))
@@ -273,9 +271,11 @@ def _lines(path: Path) -> list[dict[str, Any]]:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Seal the study's robots; bad input is one line and status 2."""
+    """Seal the robots; bad input is one line and status 2."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, prog="benchmarks.study.robots"
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog="python -m benchmarks.study.robots",
     )
     parser.add_argument("policy", type=Path, help="folder of the base policy")
     parser.add_argument("--motions", type=Path, required=True)
@@ -284,12 +284,12 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--ankles", action="store_true", help="robots that differ at the ankles alone")
     parser.add_argument("--small", action="store_true", help="the same in seconds: shows that it runs")
     options = parser.parse_args(arguments)
-    study, config = (SMALL, SMALL_CONFIG) if options.small else (Study(), ANKLES if options.ankles else RobotsConfig())
+    config = SMALL_CONFIG if options.small else ANKLES if options.ankles else RobotsConfig()
     try:
         if not (options.policy / "policy.pt").exists():
             raise BadInput(options.policy, "the folder of a trained policy", "no policy.pt in it")
         motions = read_motions(options.motions)
-        for path in seal_robots(options.policy, motions, config, options.out, study, options.threads):
+        for path in seal_robots(options.policy, motions, config, options.out, options.threads):
             print(f"{path.name}: sha256 {json.loads(path.read_text())['sha256'][:12]}")
     except BadInput as error:
         print(error)

@@ -1,36 +1,21 @@
-"""Tries the policies of a run on the sealed robots, from readings, as a robot gives them.
+"""Tries policies on the sealed robots, from readings, as a robot gives them.
 
-    python -m benchmarks.study.sealed_trials study/run --motions study/motions --robots study/robots --jobs 2
-
-Sensor noise, starts, what is known of the base's place and what is judged are those of the rounds; each policy follows
-every motion that is held out and as many training motions of each cluster, the first seconds of them. One processor
-core a policy; policies that have been tried are not tried again.
+Sensor noise, starts and what is judged are those of the robots' search, with a seed of their own; what is followed are
+the first seconds of every motion that is held out and of as many training motions of each cluster.
 """
 
-import argparse
-import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pandas as pd
 import torch
 
 from benchmarks.baselines.others.library import MovingLibrary
-from benchmarks.study.jobs import DONE, job_of
-from benchmarks.study.motions import Motions, read_motions
-from benchmarks.study.on_robot import write_csv
-from benchmarks.study.others import manner
-from benchmarks.study.robots import DECLARED, RobotsConfig
-from benchmarks.study.trying import SEALED_TRIALS
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from benchmarks.study.motions import Motions
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.evaluation.thinning import thin
-from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.policy import Policy
 from bumblebee.learning.rollout import Manner, Tick
 from bumblebee.learning.three_rules import ThreeRules
 from bumblebee.motion.clip import Clip
@@ -41,7 +26,6 @@ from bumblebee.policy.runner import robot_state
 from bumblebee.robot.sensors import SensorNoise, add_noise, draws
 from bumblebee.robot.servo_command import ServoCommand
 from bumblebee.stand_in.body import StandInRobots
-from bumblebee.stand_in.sealed import read_sealed
 from bumblebee.tracking.observing.groups import Group
 from bumblebee.tracking.observing.observations import action_middle, action_scale, joint_targets
 from bumblebee.tracking.rows import Rows
@@ -101,64 +85,10 @@ def follow_sealed(
     return judge.table(dt)
 
 
-def chosen_clips(motions: Motions, config: RobotsConfig) -> list[Clip]:
+def chosen_clips(motions: Motions, max_seconds: float) -> list[Clip]:
     """Clips to follow: a piece of every held-out motion, and training motions of all clusters, cut."""
     labels = motions.labels
     held = labels[labels["split"] == "test"].drop_duplicates("motion")["name"]
     names = [*held, *thin(labels[labels["split"] == "train"], TRAINED)]
     by_name = {row.clip.name: row.clip for row in motions.rows}
-    return [cut(by_name[name], config.max_seconds) for name in names]
-
-
-def try_sealed(folder: Path, motions: Motions, robots: Path) -> None:
-    """Try one policy on all sealed robots and the declared one; its table whole or not at all."""
-    torch.set_num_threads(1)
-    mujoco.set_mju_user_warning(lambda text: None)  # a robot that falls apart is a fall
-    config, policy, tables = RobotsConfig(), load_policy(folder), []
-    how, clips = manner(job_of(folder), policy), chosen_clips(motions, config)
-    for path in sealed_files(robots):
-        rows = follow_sealed(policy, how, clips, read_sealed(path), config.base)
-        tables.append(rows.assign(robot=path.stem, sealed=json.loads(path.read_text())["sha256"]))
-    write_csv(folder / SEALED_TRIALS, pd.concat(tables, ignore_index=True))
-
-
-def sealed_files(robots: Path) -> list[Path]:
-    """The declared robot and the sealed ones.
-
-    Raises:
-        BadInput: if there are none.
-    """
-    files = [robots / DECLARED, *sorted(robots.glob("robot-?.json"))]
-    if len(files) < 2 or not files[0].exists():
-        raise BadInput(robots, f"{DECLARED} and sealed robots", "none", "Run benchmarks.study.robots.")
-    return files
-
-
-def main() -> None:
-    """Try every finished policy of a run that has not been tried yet."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("run", type=Path)
-    parser.add_argument("--motions", type=Path, required=True)
-    parser.add_argument("--robots", type=Path, required=True)
-    parser.add_argument("--only", nargs="+", metavar="POLICY", help="these; all otherwise")
-    parser.add_argument("--jobs", type=int, default=1, help="processor cores")
-    options = parser.parse_args()
-    try:
-        sealed_files(options.robots)
-        motions = read_motions(options.motions)
-        folders = [path.parent for path in sorted(options.run.glob(f"*/{DONE}"))]
-        if options.only is not None:
-            folders = [options.run / name for name in options.only]
-        missing = [folder for folder in folders if not (folder / SEALED_TRIALS).exists()]
-        with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
-            work = [pool.submit(try_sealed, folder, motions, options.robots) for folder in missing]
-            for folder, one in zip(missing, work, strict=True):
-                one.result()
-                print(f"{folder.name}: tried", flush=True)
-    except BadInput as error:
-        print(error)
-        raise SystemExit(EXIT_BAD_INPUT) from None
-
-
-if __name__ == "__main__":
-    main()
+    return [cut(by_name[name], max_seconds) for name in names]

@@ -1,11 +1,12 @@
-"""Runs steps of the study beside each other, each a process of its own: on GPUs, or on the cores."""
+"""Runs steps of a run beside each other, each a process of its own: on GPUs, or on the cores."""
 
+import math
 import os
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ _POLL = 0.5  # s
 
 @dataclass(frozen=True)
 class Step:
-    """One process of the study."""
+    """One process of a run."""
 
     name: str
     command: tuple[str, ...]
@@ -28,8 +29,6 @@ class Step:
     """Names of the steps whose results it reads."""
     gpu: bool = False
     """Whether it has a GPU where there is one; it is then told the seconds left, and ends in time by itself."""
-    seconds: float = 0.0
-    """With less time than this left it is not begun [s]."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +43,16 @@ class Places:
     """Steps without a GPU beside each other, a core each."""
 
 
-def ready(steps: Sequence[Step], done: set[str], begun: set[str], gpu: bool, left: float | None) -> Step | None:
-    """The first step of a kind that is neither done nor begun, whose needs are done and whose time is left."""
+def deadline(seconds: float | None) -> Callable[[], bool]:
+    """Says when so many seconds are over; never without."""
+    end = math.inf if seconds is None else time.monotonic() + seconds
+    return lambda: time.monotonic() > end
+
+
+def ready(steps: Sequence[Step], done: set[str], begun: set[str], gpu: bool) -> Step | None:
+    """The first step of a kind that is neither done nor begun and whose needs are done."""
     for step in steps:
-        free = step.gpu == gpu and step.name not in done | begun and done.issuperset(step.needs)
-        if free and (left is None or left >= step.seconds):
+        if step.gpu == gpu and step.name not in done | begun and done.issuperset(step.needs):
             return step
     return None
 
@@ -111,7 +115,7 @@ class Runner:
 
     def _next(self, on_gpu: bool, left: float | None) -> Step | None:
         over = left is not None and left <= 0
-        return None if over else ready(self.steps, self._done, self._begun, on_gpu, left)
+        return None if over else ready(self.steps, self._done, self._begun, on_gpu)
 
     def _call(self, step: Step, gpu: str, left: float | None) -> int:
         """The step's exit code."""

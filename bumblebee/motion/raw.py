@@ -38,6 +38,8 @@ class RawMotion:
     """Notes on what was detected and not stated by the file: units, an order of joints; for the summary."""
     rate_from: str = "file"
     """Who states the frame rate: the file itself, or a setting."""
+    amass_fps: float | None = None
+    """Rate at which AMASS states to have recorded it [Hz]."""
 
     quat_order: str = "wxyz"
     """Order of the root's quaternion in the file, as it was read."""

@@ -13,10 +13,12 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.io.write import new_folder, write_file
-from bumblebee.motion.formats.convert import Converted, Names, claim
+from bumblebee.motion.formats.convert import Converted, claim
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.licences.table import LICENCES, Stated, table_of
-from bumblebee.motion.reading.listing import Found, find_motions, reason_of
+from bumblebee.motion.reading.file import reason_of
+from bumblebee.motion.reading.files import find_motions
+from bumblebee.motion.reading.naming import Names
 from bumblebee.motion.reading.nothing import nothing
 from bumblebee.motion.reading.one_file import FileConfig
 from bumblebee.motion.retarget.config import RetargetConfig
@@ -114,14 +116,10 @@ def _jobs(path: Path, config: RobotFiles) -> Iterator[_Job]:
         for number, motion in enumerate(found.motions):
             where = f"{place}, {shown(motion.name)}" if len(found.motions) > 1 else place
             if isinstance(motion, HumanMotion):
-                yield _Job(where, _source(found), found.licence, motion, first=not number)
+                yield _Job(where, found.source, found.licence, motion, first=not number)
             else:
                 came = "expected a motion of a person, came one of the G1: `bumblebee motions convert` writes those"
                 yield _Job(where, reason=came, first=not number)
-
-
-def _source(found: Found) -> str:
-    return shown(str(Path(found.path.parent.name) / found.path.name))
 
 
 def _made(job: _Job, config: RobotFiles) -> _Done:

@@ -60,7 +60,7 @@ def archive(path: Path, **files: str) -> Path:
 
 
 def licences(path: Path) -> dict[str, str]:
-    return {source.path.name: licence_of(source) for source in motion_sources(path)}
+    return {source.path.name: licence_of(source.path, source.archive) for source in motion_sources(path)}
 
 
 def test_the_row_that_names_a_folder_file_or_archive_is_its_own(tmp_path):
@@ -80,7 +80,10 @@ def test_the_row_that_names_a_folder_file_or_archive_is_its_own(tmp_path):
         "a.csv": ("unknown", None),
     }
     for source in motion_sources(tmp_path / "m/all.zip"):
-        assert (licence_of(source), stated_rate(source)) == ("free, not to resell", 120)
+        assert (licence_of(source.path, source.archive), stated_rate(source.path, source.archive)) == (
+            "free, not to resell",
+            120,
+        )
 
 
 def test_a_licence_file_named_after_an_archive_is_that_of_its_members(tmp_path):

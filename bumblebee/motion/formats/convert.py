@@ -1,6 +1,5 @@
 """Motions of any format that is read, written in one that other trainers take, with the licence of each."""
 
-import hashlib
 import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -8,18 +7,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bumblebee.errors import BadInput
-from bumblebee.io.names import safe_stem
 from bumblebee.io.write import new_folder, refuse_entering, try_output
-from bumblebee.motion.checks import check_clip
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.write import FORMATS, write_motion
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
-from bumblebee.motion.licences.of_files import licence_of
-from bumblebee.motion.licences.table import LICENCES, Stated, read_table, stated_of, table_of
+from bumblebee.motion.licences.table import LICENCES, Stated, read_table, table_of
 from bumblebee.motion.raw import RawMotion
-from bumblebee.motion.reading.listing import Found, Motion, find_motions, reason_of
+from bumblebee.motion.reading import clips
+from bumblebee.motion.reading.file import File, Motion, reason_of
+from bumblebee.motion.reading.files import find_motions
+from bumblebee.motion.reading.naming import Names
 from bumblebee.motion.reading.nothing import nothing
 from bumblebee.motion.reading.one_file import FileConfig
 from bumblebee.motion.reading.usable import usable
@@ -121,7 +120,7 @@ def _ours(out: Path, to: str) -> bool:
     return bool(written) and names <= {LICENCES, *written}
 
 
-def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> tuple[Clip, tuple[str, ...]]:
+def clip_of(raw: RawMotion, fps: float | None, file: File | None = None) -> tuple[Clip, tuple[str, ...]]:
     """A motion of the robot, checked and at another rate, as a clip, and the notes on it and its captions.
 
     Heights stay as they are.
@@ -131,21 +130,8 @@ def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> tuple[Clip, 
     """
     raw = usable(raw)
     raw = resample(raw, fps or raw.fps)
-    texts, before = beside(raw.file, (len(raw.root_pos) - 1) / raw.fps), stated_of(raw.file)
-    clip = make_clip(
-        safe_stem(raw.name, "motion"),
-        raw.fps,
-        raw.root_pos,
-        raw.root_quat,
-        raw.joint_pos,
-        captions=texts.captions,
-        caption_source=texts.source,
-        source=before.source if before else shown(str(Path(raw.file.parent.name) / raw.file.name)),
-        licence=before.licence if before else licence_of(raw.file),
-        sha256=digest,
-    )
-    check_clip(raw.where, clip)
-    return clip, (*raw.notes, *texts.notes)
+    texts = beside(raw.file, (len(raw.root_pos) - 1) / raw.fps)
+    return clips.clip_of(raw, file or File(raw.file), texts), (*raw.notes, *texts.notes)
 
 
 def clips_at(
@@ -186,44 +172,18 @@ def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[s
             yield replace(clip, name=names.distinct(clip.name, found.path.parent.name))
 
 
-def _clip(motion: Motion, found: Found, config: ConvertConfig) -> tuple[Clip, tuple[str, ...]]:
+def _clip(motion: Motion, file: File, config: ConvertConfig) -> tuple[Clip, tuple[str, ...]]:
     if isinstance(motion, HumanMotion):
         motion = retarget(motion, config.rate or _LIBRARY_FPS)
     if isinstance(motion, RawMotion):
-        clip, notes = clip_of(motion, config.rate, hashlib.sha256(found.data).hexdigest())
-        return replace(clip, licence=found.licence), notes
+        return clip_of(motion, config.rate, file)
     if config.rate is None or config.rate == motion.fps:
         return motion, ()
-    raw = RawMotion(motion.name, motion.fps, motion.root_pos, motion.root_quat, motion.joint_pos, found.path)
+    raw = RawMotion(motion.name, motion.fps, motion.root_pos, motion.root_quat, motion.joint_pos, file.path)
     moved = resample(raw, config.rate)
     about = {name: getattr(motion, name) for name in ("captions", "source", "licence", "sha256", "family", "split")}
     about["caption_source"] = motion.caption_source
     return make_clip(motion.name, moved.fps, moved.root_pos, moved.root_quat, moved.joint_pos, **about), ()
-
-
-class Names:
-    """Names of files, no two alike, also where the file system does not tell cases apart."""
-
-    def __init__(self) -> None:
-        self._taken = {_folded(Path(LICENCES).stem)}
-        self._last: dict[str, int] = {}  # so that a hundred thousand motions of one name need no search each
-
-    def distinct(self, name: str, folder: str) -> str:
-        """`name`, with the folder's in front where it is taken, with a number where that is not enough."""
-        tried = name
-        if _folded(tried) in self._taken and folder:
-            tried = safe_stem(f"{folder[:20]}_{name}")
-        stem, number = tried[:100], self._last.get(_folded(tried[:100]), 1)
-        while _folded(tried) in self._taken:
-            number += 1
-            tried = f"{stem}_{number}"
-        self._last[_folded(stem)] = number
-        self._taken.add(_folded(tried))
-        return tried
-
-
-def _folded(name: str) -> str:
-    return name.replace(".", "_").casefold()
 
 
 def _counted(clips: Iterable[Clip], done: Converted) -> Iterator[Clip]:

@@ -9,7 +9,6 @@ from bumblebee.io.read import read_bytes
 from bumblebee.motion.licences.sources_table import row_of
 from bumblebee.motion.licences.terms import UNKNOWN, noncommercial
 from bumblebee.motion.reading.archives import SUFFIXES, list_archive
-from bumblebee.motion.reading.sources import Source
 from bumblebee.motion.texts import shown
 
 _MAX_BYTES = 4 << 20  # of a licence or a table
@@ -32,27 +31,24 @@ _FILES = ("LICENSE", "LICENCE", "LICENSE.txt", "LICENCE.txt", "LICENSE.md", "LIC
 _RATE = re.compile(r"(?:(\d+(?:\.\d+)?)\s*(?:to|and|or|[-/,\u2013])\s*)?\b(\d+(?:\.\d+)?)\s*Hz\b")
 
 
-def licence_of(file: Path | Source) -> str:
+def licence_of(file: Path, archive: Path | None = None) -> str:
     """The licence under which a motion file, or a member of an archive, comes.
 
     A file: its row in SOURCES.md, else a licence file in its folder. A member: the row that names the archive, else
     `<stem>.LICENCE.txt` beside the archive, else a licence file in it, the nearest to the member, else that of the
     archive's folder. A text that is no licence known here but forbids commercial use says so.
     """
-    if isinstance(file, Path):
+    if archive is None:
         return _from_table(file) or _from_folder(file.resolve().parent) or UNKNOWN
-    if file.archive is None:
-        return licence_of(file.path)
-    row = row_of(file.archive)
-    named = row is not None and any(name.name == file.archive.name for name in row.names)
-    own = _from_table(file.archive) if named else ""
-    return own or _beside(file.archive) or _inside(file) or licence_of(file.archive)
+    row = row_of(archive)
+    named = row is not None and any(name.name == archive.name for name in row.names)
+    own = _from_table(archive) if named else ""
+    return own or _beside(archive) or _inside(file, archive) or licence_of(archive)
 
 
-def stated_rate(source: Path | Source) -> float | None:
+def stated_rate(file: Path, archive: Path | None = None) -> float | None:
     """The frame rate [Hz] that SOURCES.md states for a file, its folder or its archive, where it states exactly one."""
-    place = source if isinstance(source, Path) else source.archive or source.path
-    row = row_of(place)
+    row = row_of(archive or file)
     if row is None:
         return None
     said = [rate for cell in row.cells.values() for pair in _RATE.findall(cell) for rate in pair if rate]
@@ -81,11 +77,10 @@ def _beside(archive: Path) -> str:
     return next((found for name in names if (found := _named(name, _text(archive.parent / name)))), "")
 
 
-def _inside(source: Source) -> str:
+def _inside(member: Path, archive: Path) -> str:
     """Licence in a file in a member's folder or one above it in the archive."""
-    archive = source.archive
-    texts = _archived(archive) if archive else {}
-    folders = source.path.relative_to(archive).parents if archive and texts else []
+    texts = _archived(archive)
+    folders = member.relative_to(archive).parents if texts else []
     return next((texts[str(folder)] for folder in folders if str(folder) in texts), "")
 
 

@@ -1,129 +1,121 @@
-"""The files at a path, one after the other, and what came of each; the work on them goes to several processes."""
+"""The files at a path, one after the other, each with its bytes or why it has none; the tree is walked here alone."""
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
-from bumblebee.motion.clip import Clip
-from bumblebee.motion.licences.table import LICENCES
-from bumblebee.motion.reading.listing import csv_rate, reason_of
-from bumblebee.motion.reading.ready import Job, Ready, Refused, make_ready
-from bumblebee.motion.reading.settings import ReadConfig
+from bumblebee.motion.human.motion import HumanMotion, Role
+from bumblebee.motion.human.skeleton import UnknownSkeleton
+from bumblebee.motion.licences.of_files import stated_rate
+from bumblebee.motion.licences.table import LICENCES, stated_of
+from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.reading.file import File, reason_of, tried
+from bumblebee.motion.reading.one_file import FileConfig, read_one
 from bumblebee.motion.reading.sources import Source
 from bumblebee.motion.reading.walk import INDEX, motion_sources
-from bumblebee.motion.side_by_side import in_order
 from bumblebee.motion.store import Library
-from bumblebee.motion.texts import shown
 
-Result = TypeVar("Result")
-
-
-@dataclass(frozen=True)
-class File:
-    """One source and what came of it: motions, or why there are none; a library's clips come as they are."""
-
-    source: Source
-    sha256: str = ""
-    ready: tuple[Ready, ...] = ()
-    refused: tuple[Refused, ...] = ()
-    """Motions of a file of several that cannot be used."""
-    clips: tuple[Clip, ...] = ()
-    reason: str = ""
-    place: Path | None = None
-    """Place of a library's clip that gave none."""
+_DO = "docs/data.md has the formats that are read."
 
 
-def each_file(path: Path, config: ReadConfig, cache: Path | None) -> Iterator[File]:
-    """Each file and what came of it, in order; the work on them goes to several processes."""
-    work = partial(_worked, config=config, cache=cache)
-    loaded = (_loaded(source, config) for source in motion_sources(path) if source.path.name != LICENCES)
-    for done in in_order(work, loaded, config.processes):
-        if done.source.path.name == INDEX and done.source.archive is None and not done.reason:
-            yield from _library(done.source)
+def opened(path: Path, config: FileConfig) -> Iterator[File]:
+    """Each file at or below `path` with its bytes, or why it has none; a library by its index, without bytes."""
+    for source in motion_sources(path):
+        if source.path.name == LICENCES:
+            continue
+        if source.path.name == INDEX and source.archive is None:
+            yield File(source.path, library=source.path)
         else:
-            yield done
+            yield _opened(source, config)
 
 
-@dataclass(frozen=True)
-class _Loaded:
-    """A source with its bytes, or why it has none; without `Source.read`, which does not go to other processes."""
+def find_motions(path: Path, config: FileConfig | None = None) -> Iterator[File]:
+    """Each file at or below `path`, read when it is asked for; a bad one is a reason, and the next follows.
 
-    path: Path
-    archive: Path | None
-    data: bytes = b""
-    csv_fps: float | None = None
-    reason: str = ""
+    Args:
+        path: a file, a folder or a motion library.
+        config: what files may leave unsaid.
+
+    Raises:
+        BadInput: nothing lies at `path`, or nothing that could be a motion; a mapping of joints that is none.
+    """
+    path, config = Path(path), config or FileConfig()
+    config.require_skeleton()
+    if not os.path.lexists(path):
+        raise BadInput(path, "a motion file, or a folder that holds some", "no such file or folder", _DO)
+    nothing = True
+    for file in opened(path, config):
+        nothing = False
+        yield from clips_of(file) if file.library else [with_motions(file, config)]
+    if nothing:
+        raise BadInput(path, "a motion file, or a folder that holds some", "none", _DO)
 
 
-def _loaded(source: Source, config: ReadConfig) -> _Loaded:
-    if source.path.name == INDEX and source.archive is None:
-        return _Loaded(source.path, None)
+def with_motions(file: File, config: FileConfig) -> File:
+    """The file with its motions at their own rates, unchecked, in the place of its bytes; never raises."""
+    if file.reason:
+        return file
+    roles: list[Role] = []
+
+    def read() -> list[RawMotion | HumanMotion]:
+        try:
+            return read_one(file.path, file.data, replace(config, csv_fps=file.csv_fps))
+        except UnknownSkeleton as error:
+            roles.extend(error.roles)
+            raise
+
+    found = tried(read, file.path)
+    if isinstance(found, str):
+        return replace(file, data=b"", reason=found, skeleton=tuple(roles))
+    if file.rate_from:
+        found = [replace(raw, rate_from=file.rate_from) if isinstance(raw, RawMotion) else raw for raw in found]
+    return replace(file, data=b"", motions=tuple(found))
+
+
+def clips_of(library: File) -> Iterator[File]:
+    """The clips of a library, each by itself: a damaged one does not take the others with it."""
+    index = library.path
+    held = tried(partial(Library, index.parent), index)
+    if isinstance(held, str):
+        yield replace(library, reason=held)
+        return
+    for name, clip in held.each():
+        place = File(index.parent / name, library=index)
+        yield (
+            replace(place, reason=reason_of(clip, index.parent))
+            if isinstance(clip, BadInput)
+            else replace(place, motions=(clip,))
+        )
+
+
+def _opened(source: Source, config: FileConfig) -> File:
+    file = File(source.path, source.archive)
     if source.path.is_dir():
         came = "a link to a folder, which is not followed" if source.path.is_symlink() else "one that cannot be listed"
-        return _Loaded(source.path, source.archive, reason=f"expected a folder with motions, came {came}")
+        return replace(file, reason=f"expected a folder with motions, came {came}")
     data = tried(partial(source.read, LIMITS.file_bytes), source.path)
     if isinstance(data, str):
-        return _Loaded(source.path, source.archive, reason=data)
-    rate = _csv_fps(source, config)
-    return _Loaded(source.path, source.archive, data, rate)
+        return replace(file, reason=data)
+    rate, rate_from = _csv_rate(source, config)
+    digest = hashlib.sha256(data).hexdigest()
+    return replace(file, data=data, sha256=digest, csv_fps=rate, rate_from=rate_from)
 
 
-def _worked(loaded: _Loaded, config: ReadConfig, cache: Path | None) -> File:
-    """File with its motions; never raises."""
-    source = Source(loaded.path, _gone, loaded.archive)
-    if loaded.reason or (loaded.path.name == INDEX and loaded.archive is None):
-        return File(source, reason=loaded.reason)
-    digest = hashlib.sha256(loaded.data).hexdigest()
-    job = Job(loaded.path, loaded.data, digest, loaded.csv_fps, cache)
-    found = tried(partial(make_ready, job, config), loaded.path)
-    if isinstance(found, str):
-        return File(source, digest, reason=found)
-    ready = tuple(one for one in found if isinstance(one, Ready))
-    refused = tuple(one for one in found if isinstance(one, Refused))
-    return File(source, digest, ready, refused, reason="" if found else "no motion in it")
-
-
-def _gone(most: int) -> bytes:
-    raise AssertionError("the bytes were read before")
-
-
-def _library(source: Source) -> Iterator[File]:
-    """The clips of a library, and each damaged one by itself, so that it does not take the others with it."""
-    library = tried(partial(Library, source.path.parent), source.path)
-    if isinstance(library, str):
-        yield File(source, reason=library)
-        return
-    whole = []
-    for name, clip in library.each():
-        if isinstance(clip, BadInput):
-            reason = reason_of(clip, source.path)
-            yield File(source, reason=reason, place=source.path.parent / name)
-        else:
-            whole.append(clip)
-    yield File(source, clips=tuple(whole))
-
-
-def _csv_fps(source: Source, config: ReadConfig) -> float | None:
-    """The rate of a CSV file [Hz]: that of a folder by the settings, else as for every command (`csv_rate`)."""
-    for folder in Path(os.path.realpath(source.path)).parents:
-        if folder.name in config.csv_fps_by_folder:
-            return config.csv_fps_by_folder[folder.name]
-    return csv_rate(source, config)[0]
-
-
-def tried(read: Callable[[], Result], file: Path) -> Result | str:
-    """Result of `read`, or why there is none."""
-    try:
-        return read()
-    except BadInput as error:
-        return reason_of(error, file)
-    except OSError as error:  # a file that vanished, a disk that was unplugged
-        return shown(error.strerror or str(error))
-    except Exception as error:  # a mistake of ours about one file must not cost the user all the others
-        return shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
+def _csv_rate(source: Source, config: FileConfig) -> tuple[float | None, str]:
+    """The rate of a CSV file [Hz] and who says it: its folder's, LICENCES.csv beside it, SOURCES.md; settings: ""."""
+    if source.path.suffix.lower() != ".csv":
+        return config.csv_fps, ""
+    if (rate := config.rate_below(Path(os.path.realpath(source.path)))) is not None:
+        return rate, ""
+    stated = stated_of(source.path) if source.archive is None else None
+    if stated is not None:
+        return stated.fps, LICENCES
+    if config.csv_fps is not None:
+        return config.csv_fps, ""
+    rate = stated_rate(source.path, source.archive)
+    return rate, "SOURCES.md" if rate else ""

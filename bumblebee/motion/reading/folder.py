@@ -4,27 +4,25 @@ import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 
 import pandas as pd
 
-from bumblebee.io.names import safe_stem
 from bumblebee.io.there import require_motions
 from bumblebee.motion.captions import family_of
-from bumblebee.motion.checks import check_clip
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.accounting import Account, account
 from bumblebee.motion.describe.described import Described
 from bumblebee.motion.describe.describer import Describer, describer
-from bumblebee.motion.kinematics import make_clip
-from bumblebee.motion.licences.of_files import licence_of
-from bumblebee.motion.licences.table import stated_of
 from bumblebee.motion.pieces import split_long
+from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.reading.clips import clip_of
 from bumblebee.motion.reading.few_lines import said_of
-from bumblebee.motion.reading.files import File, each_file, tried
+from bumblebee.motion.reading.file import File, tried
 from bumblebee.motion.reading.naming import distinct
 from bumblebee.motion.reading.nothing import nothing
-from bumblebee.motion.reading.ready import Ready
+from bumblebee.motion.reading.ready import each_file
 from bumblebee.motion.reading.settings import ReadConfig
 from bumblebee.motion.texts import shown
 
@@ -108,24 +106,32 @@ def _groups(
 ) -> Iterator[tuple[Path, list[Clip]]]:
     """The clips that belong together, with their file: the pieces of a motion, or those of a library."""
     root = path if path.is_dir() else path.parent
-    for file in each_file(path, config, cache):
-        name = shown(os.path.relpath(file.place or file.source.path, root))
-        if file.reason:
-            heard.skipped.append((name, file.reason))
-        heard.skipped += [(f"{name}, {one.part}", one.reason) for one in file.refused]
-        for group in _apart([split_long(clip, config.max_seconds) for clip in file.clips]):
-            yield file.source.path, group
-        for ready in file.ready:
-            said = say.captions(ready.raw.file, ready.raw.name, _seconds(ready), ready.amass_fps)
-            made = tried(partial(_clips, ready, said, file, config), file.source.path)
-            if isinstance(made, str):
-                heard.skipped.append((name, made))
-                continue
-            heard.texts.append(said)
-            heard.notes += [(name, note) for note in (*ready.raw.notes, *said.notes)]
-            yield file.source.path, made
-        if not file.place:
-            tell()
+    numbered = enumerate(each_file(path, config, cache))
+    for _, some in groupby(numbered, key=lambda one: one[1].library or one[0]):
+        files = [file for _, file in some]
+        if files[0].library:
+            yield from _of_library(files[0].library, files, config)
+        for file in files:
+            name = shown(os.path.relpath(file.path, root))
+            heard.skipped += [(name, file.reason)] if file.reason else []
+            heard.skipped += [(f"{name}, {part}", reason) for part, reason in file.refused]
+            for raw in [motion for motion in file.motions if isinstance(motion, RawMotion)]:
+                said = say.captions(raw.file, raw.name, _seconds(raw), raw.amass_fps)
+                made = tried(partial(_pieces, raw, file, said, config), file.path)
+                if isinstance(made, str):
+                    heard.skipped.append((name, made))
+                    continue
+                heard.texts.append(said)
+                heard.notes += [(name, note) for note in (*raw.notes, *said.notes)]
+                yield file.path, made
+        tell()
+
+
+def _of_library(index: Path, files: list[File], config: ReadConfig) -> Iterator[tuple[Path, list[Clip]]]:
+    """The clips of a library, with its index: they have been read before, and are cut alone."""
+    clips = [motion for file in files for motion in file.motions if isinstance(motion, Clip)]
+    for group in _apart([split_long(clip, config.max_seconds) for clip in clips]):
+        yield index, group
 
 
 def _apart(clips: list[list[Clip]]) -> list[list[Clip]]:
@@ -134,29 +140,12 @@ def _apart(clips: list[list[Clip]]) -> list[list[Clip]]:
     return [[clip for pieces in clips for clip in pieces]] if len(set(names)) == len(names) else clips
 
 
-def _clips(ready: Ready, said: Described, file: File, config: ReadConfig) -> list[Clip]:
-    """A motion with its texts, licence and keypoints, cut."""
-    raw = ready.raw
-    before = stated_of(raw.file) if file.source.archive is None else None
-    clip = make_clip(
-        safe_stem(raw.name, "motion"),
-        raw.fps,
-        raw.root_pos,
-        raw.root_quat,
-        raw.joint_pos,
-        captions=said.captions,
-        caption_source=said.source,
-        source=before.source if before else shown(str(Path(raw.file.parent.name) / raw.file.name)),
-        licence=before.licence if before else licence_of(file.source),
-        sha256=file.sha256,
-        family=family_of(raw.name),
-    )
-    check_clip(raw.where, clip)
-    return split_long(clip, config.max_seconds)
+def _pieces(raw: RawMotion, file: File, said: Described, config: ReadConfig) -> list[Clip]:
+    return split_long(clip_of(raw, file, said, family_of(raw.name)), config.max_seconds)
 
 
-def _seconds(ready: Ready) -> float:
-    return (len(ready.raw.root_pos) - 1) / ready.raw.fps
+def _seconds(raw: RawMotion) -> float:
+    return (len(raw.root_pos) - 1) / raw.fps
 
 
 def skipped_table(rows: list[tuple[str, str]]) -> pd.DataFrame:

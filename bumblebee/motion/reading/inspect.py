@@ -10,11 +10,12 @@ from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
-from bumblebee.motion.formats.convert import Names
 from bumblebee.motion.formats.read import format_of
 from bumblebee.motion.human.motion import HumanMotion, Role
 from bumblebee.motion.raw import RawMotion
-from bumblebee.motion.reading.listing import Found, Motion, find_motions, reason_of
+from bumblebee.motion.reading.file import File, Motion, reason_of
+from bumblebee.motion.reading.files import find_motions
+from bumblebee.motion.reading.naming import Names
 from bumblebee.motion.reading.one_file import FileConfig
 from bumblebee.motion.reading.usable import usable
 
@@ -102,7 +103,7 @@ def _named(row: Inspected, names: Names) -> Inspected:
     return replace(row, name=names.distinct(safe_stem(row.name, "motion"), row.file.parent.name))
 
 
-def rows_of(found: Found) -> list[Inspected]:
+def rows_of(found: File) -> list[Inspected]:
     """A row for each motion of a file; one with the reason where there is none."""
     if not found.motions:
         reason = found.reason or "no motion in it"
@@ -110,7 +111,7 @@ def rows_of(found: Found) -> list[Inspected]:
     return [_row(found, motion) for motion in found.motions]
 
 
-def _row(found: Found, motion: Motion) -> Inspected:
+def _row(found: File, motion: Motion) -> Inspected:
     path = found.path
     if isinstance(motion, Clip):
         return Inspected(

@@ -1,4 +1,4 @@
-"""Names of clips that are read together: distinct, and short enough for files."""
+"""Names of clips that are read together, and of files: distinct, and short enough."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bumblebee.io.names import LONGEST, safe_stem
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.licences.table import LICENCES
 from bumblebee.motion.pieces import motion_of
 
 
@@ -43,3 +44,28 @@ def _fitting(motion: str, tail: str) -> str:
     while len((motion + tail).encode()) > LONGEST:
         motion = motion[:-1]
     return motion + tail
+
+
+class Names:
+    """Names of files, no two alike, also where the file system does not tell cases apart."""
+
+    def __init__(self) -> None:
+        self._taken = {_same(Path(LICENCES).stem)}
+        self._last: dict[str, int] = {}  # so that a hundred thousand motions of one name need no search each
+
+    def distinct(self, name: str, folder: str) -> str:
+        """`name`, with the folder's in front where it is taken, with a number where that is not enough."""
+        tried = name
+        if _same(tried) in self._taken and folder:
+            tried = safe_stem(f"{folder[:20]}_{name}")
+        stem, number = tried[:100], self._last.get(_same(tried[:100]), 1)
+        while _same(tried) in self._taken:
+            number += 1
+            tried = f"{stem}_{number}"
+        self._last[_same(stem)] = number
+        self._taken.add(_same(tried))
+        return tried
+
+
+def _same(name: str) -> str:
+    return name.replace(".", "_").casefold()

@@ -59,6 +59,10 @@ class FileConfig(Ranged):
         if self.skeleton:
             read_stated(self.skeleton)
 
+    def rate_below(self, place: Path) -> float | None:
+        """Rate of the CSV files in a folder by its name, where the settings say one [Hz]."""
+        return None
+
     @property
     def robot(self) -> RobotConfig:
         """Settings of motions of the robot."""

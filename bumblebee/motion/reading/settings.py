@@ -1,6 +1,7 @@
 """Settings of reading: the section `motions.read` of params.yaml."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated
 
 from bumblebee.motion.describe.describer import DescribeConfig
@@ -30,6 +31,11 @@ class ReadConfig(FileConfig):
     """Correction of robot motions that float or sink; retargeted ones stand already."""
     describe: DescribeConfig = field(default_factory=DescribeConfig)
     """Where texts come from."""
+
+    def rate_below(self, place: Path) -> float | None:
+        """Rate of the CSV files in a folder by its name, the nearest first, where the settings say one [Hz]."""
+        named = (self.csv_fps_by_folder.get(folder.name) for folder in place.parents)
+        return next((rate for rate in named if rate is not None), None)
 
     def __post_init__(self) -> None:
         """Refuse pieces that are shorter than any motion."""

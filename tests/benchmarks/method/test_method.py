@@ -93,7 +93,7 @@ def test_every_row_has_as_many_iterations(folder: Path) -> None:
 
 def test_an_expert_learns_in_its_own_correction() -> None:
     out = Path("out")
-    assert correction(out, f"{OWN}/c0").diagnosis is None
+    assert correction(out, f"{OWN}/c0").diagnosis is None and correction(out, f"{OWN}/c0").adapter() is None
     found = correction(out, "robot-0/both/r2/c1")
     assert found.diagnosis == out / "robot-0/both/r2/diagnosis"
     assert found.delta == out / "robot-0/both/r2/c1/delta"

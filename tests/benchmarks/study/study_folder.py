@@ -1,4 +1,4 @@
-"""Inputs of a study, small: motions in clusters and a sealed robot without effects."""
+"""Inputs of a run, small: motions in clusters and a sealed robot without effects."""
 
 import json
 from dataclasses import replace
@@ -37,4 +37,3 @@ def fill(folder: Path) -> None:
     (folder / "robots").mkdir()
     sealed = {"schema": SCHEMA, "sealed": "for a test", "effects": [], "sha256": seal([])}
     (folder / "robots" / "declared.json").write_text(json.dumps(sealed))
-    (folder / "robots" / "followed.json").write_text(json.dumps({"names": names[1:2]}))

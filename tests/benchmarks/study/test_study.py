@@ -1,36 +1,27 @@
-"""The study: a run is held to its settings, goes on where it was ended, and its tables pair what belongs together."""
+"""Motions, steps beside each other, settings that a run is held to, figures of tables."""
 
 import json
-import shutil
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks.method.settings import SMALL
 from benchmarks.motion_pack import Packed, write_pack
+from benchmarks.study import motions as module
 from benchmarks.study.__main__ import main
-from benchmarks.study.jobs import (
-    PAPER_ARMS,
-    PAPER_LONGER,
-    SURVIVORS,
-    base_of,
-    even_of,
-    experts_jobs,
-    one_of,
-    paper_jobs,
-    robust_jobs,
-)
 from benchmarks.study.motions import LABELS, MOTIONS, read_motions
-from benchmarks.study.pages.paper_tables import paper_tables
-from benchmarks.study.pages.robust_tables import robust_tables
-from benchmarks.study.pages.tables import difference, experts_tables, rate
-from benchmarks.study.settings import PAPER_CHANGES, ROBUST_CHANGES, SMALL, Study, freeze, settings_of
-from benchmarks.study.steps import GOES_ON, Places, Runner, Step, ready
-from benchmarks.study.training import finished, train
-from benchmarks.study.trying import write_trials
+from benchmarks.study.settings import freeze, frozen
+from benchmarks.study.steps import GOES_ON, Places, Runner, Step, deadline, ready
+from benchmarks.study.tables import cell, difference, rate
+from bumblebee.clustering.config import ClusterConfig
 from bumblebee.errors import BadInput
+from bumblebee.evaluation.intervals import Estimate
+from bumblebee.motion.clip import Clip
 from tests.benchmarks.study.study_folder import short_clips
 
 
@@ -56,95 +47,61 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_one_policy_gets_the_steps_of_all_experts_and_random_clusters_are_as_many(folder: Path) -> None:
+def test_a_step_waits_for_what_it_needs_and_for_its_kind_of_place() -> None:
+    steps = [Step("b", (), Path("b"), gpu=True), Step("c", (), Path("c"), ("b",), gpu=True)]
+    assert ready(steps, set(), {"b"}, True) is None
+    assert ready(steps, {"b"}, {"b"}, False) is None
+    assert ready(steps, {"b"}, {"b"}, True) == steps[1]
+    assert ready(steps, {"b", "c"}, set(), True) is None
+
+
+def test_a_call_is_over_after_its_seconds_and_without_any_never() -> None:
+    assert deadline(-1.0)() and not deadline(60.0)() and not deadline(None)()
+
+
+def test_nothing_held_out_is_learned_from_and_random_clusters_are_as_many_and_as_large(folder: Path) -> None:
     motions = read_motions(folder)
-    jobs = {job.name: job for job in experts_jobs(SMALL, motions)}
-    experts = [job for name, job in jobs.items() if name.startswith("s0-c")]
-    others = [job for name, job in jobs.items() if name.startswith("s0-r")]
-    assert len(experts) == len(others) == 2
-    assert jobs[even_of(0)].even
-    assert (
-        jobs[one_of(0)].steps
-        == jobs[even_of(0)].steps
-        == sum(job.steps for job in experts)
-        == sum(job.steps for job in others)
-    )
-    for group in (experts, others):
-        assert sorted(name for job in group for name in job.clips or ()) == sorted(motions.labels["name"])
+    train = motions.labels[motions.labels["split"] == "train"]
+    assert [row.clip.name for row in motions.training()] == train["name"].tolist()
+    random = motions.random_clusters(0)
+    assert sorted(random.index) == sorted(motions.labels["name"]) and random.equals(motions.random_clusters(0))
+    assert random[train["name"]].value_counts().to_dict() == {"r0": 3, "r1": 3}
+    clips = [row.clip for row in motions.rows]
+    assert motions.cluster_indices(clips) == [0] * 4 + [1] * 4
+    assert motions.cluster_indices(clips, 0) == [int(random[clip.name][1:]) for clip in clips]
 
 
-def test_nothing_held_out_is_learned_from(folder: Path) -> None:
-    motions = read_motions(folder)
-    held = set(motions.labels[motions.labels["split"] == "test"]["name"])
-    for job in experts_jobs(SMALL, motions):
-        learned = {row.clip.name for row in motions.training(job.clips)}
-        assert learned
-        assert not learned & held
-
-
-def test_a_step_waits_for_what_it_needs_for_its_kind_of_place_and_for_its_time() -> None:
-    steps = [Step("b", (), Path("b"), gpu=True), Step("c", (), Path("c"), ("b",), gpu=True, seconds=60.0)]
-    assert ready(steps, set(), {"b"}, True, None) is None
-    assert ready(steps, {"b"}, {"b"}, False, None) is None
-    assert ready(steps, {"b"}, {"b"}, True, 59.0) is None
-    assert ready(steps, {"b"}, {"b"}, True, 60.0) == ready(steps, {"b"}, {"b"}, True, None) == steps[1]
-    assert ready(steps, {"b", "c"}, set(), True, None) is None
-
-
-def test_a_run_is_trained_ended_gone_on_with_and_made_into_tables(folder: Path, tmp_path: Path) -> None:
-    motions, out = read_motions(folder), tmp_path / "run"
-    freeze(out, SMALL, motions=motions.hash)
-    jobs = experts_jobs(SMALL, motions)
-    assert not train(jobs[0], motions, SMALL, out, over=lambda: True)
-    assert not finished(out, jobs[0])
-    for job in jobs:
-        assert train(job, motions, SMALL, out)
-        assert finished(out, job)
-        write_trials(out / job.name, motions)
-    with pytest.raises(BadInput, match="another training"):
-        finished(out, replace(jobs[0], steps=1.0))
-    text = experts_tables(out, SMALL, motions)
-    assert "experts by cluster | held out | 2 |" in text
-    assert text.count("experts by cluster less one policy, the experts' steps") == 4
-    assert text.count("the same, each cluster drawn as often less one policy") == 4
-    shutil.rmtree(out / even_of(0))
-    assert "drawn as often" not in experts_tables(out, SMALL, motions)
-    text = experts_tables(out, SMALL, motions)
-    main(
-        [
-            "table",
-            "experts",
-            str(out),
-            "--motions",
-            str(folder),
-            "--small",
-            "--out",
-            str(tmp_path / "t.md"),
-            "--curves",
-            str(tmp_path / "c.svg"),
-        ]
-    )
-    assert text in (tmp_path / "t.md").read_text()
-    assert "</svg>" in (tmp_path / "c.svg").read_text()
-
-
-def test_a_run_goes_on_with_its_own_settings_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    freeze(tmp_path, replace(SMALL, expert_steps=7.0), motions=read_motions(folder).hash)
-    with pytest.raises(SystemExit) as end:
-        main(["run", "experts", "--small", "--motions", str(folder), "--out", str(tmp_path)])
-    assert end.value.code == 2
-    assert "study.expert_steps" in capsys.readouterr().out
-
-
-def test_a_gpu_that_is_not_there_is_said_before_anything_is_written(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+def test_motions_are_prepared_from_their_sources_and_what_cannot_be_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("torch.cuda.device_count", lambda: 0)
+    """Reading and clustering have tests of their own; here they are made up."""
+    clips = [replace(clip, family="some") for clip in short_clips(10)]
+    monkeypatch.setattr(module, "read_folder", lambda source, config: SimpleNamespace(clips=clips))
+    monkeypatch.setattr("bumblebee.clustering.pipeline.cluster_clips", clustered)
+    given = ["--out", str(tmp_path / "motions")]
+    main(["prepare", "people.zip", *given])
+    told = capsys.readouterr().out
+    motions = read_motions(tmp_path / "motions")
+    assert motions.clusters == ["c0", "c1"] and set(motions.labels["group"]) == {"people"}
+    held = round(0.22 * len(motions.rows))
+    assert motions.labels["split"].value_counts().to_dict() == {"train": len(motions.rows) - held, "test": held}
+    assert "c1: waits; 3 pieces, 1 held out, 0.10 m/s" in told and f"test {held}" in " ".join(told.split())
     with pytest.raises(SystemExit) as end:
-        main(["run", "experts", "--motions", str(folder), "--out", str(tmp_path / "new"), "--gpus", "2"])
+        main(["prepare", "people.zip", "again.zip", *given])
     assert end.value.code == 2
-    assert "--gpus: expected a machine with a GPU, came 2" in capsys.readouterr().out
-    assert not (tmp_path / "new").exists()
+    assert "sources: expected motions of different names, came" in capsys.readouterr().out
+    pd.read_csv(tmp_path / "motions" / LABELS)[1:].to_csv(tmp_path / "motions" / LABELS, index=False)
+    with pytest.raises(BadInput, match="a row for each piece"):
+        read_motions(tmp_path / "motions")
+
+
+def clustered(clips: Sequence[Clip], names: Sequence[str], config: ClusterConfig) -> SimpleNamespace:
+    """Clips in clusters by turns, and an elbow at two."""
+    labels = pd.DataFrame({"name": [clip.name for clip in clips]})
+    one = {"label": "waits", "clips": 3, "held_out_clips": 1, "speed": 0.1}
+    summary = {"elbow": {"suggested_k": 2}, "clusters": dict.fromkeys(names, one)}
+    labels["cluster"] = [names[i % len(names)] for i in range(len(clips))]
+    return SimpleNamespace(labels=labels, elbow=pd.DataFrame({"k": [2]}), summary=summary)
 
 
 def test_a_cluster_of_one_motion_is_refused(folder: Path, tmp_path: Path) -> None:
@@ -191,6 +148,8 @@ def test_a_rate_of_none_has_an_interval_and_pieces_and_seeds_of_a_motion_are_no_
     once, often = rate(half, "success"), rate(pd.concat([half] * 6), "success")
     assert once.value == often.value == 0.5
     assert (once.low, once.high) == pytest.approx((often.low, often.high))
+    assert cell(Estimate(0.5, float("nan"), float("nan"), 1, 1), 2) == "0.50"
+    assert cell(Estimate(float("nan"), 0.0, 0.0, 0, 0), 2) == "-"
 
 
 def _print(path: Path, code: int) -> str:
@@ -228,72 +187,24 @@ def test_the_frozen_file_is_plain(tmp_path: Path) -> None:
     first = freeze(tmp_path, SMALL, motions="x")
     assert first == freeze(tmp_path, SMALL, motions="x")
     stated = json.loads((tmp_path / "study.json").read_text())
-    assert stated["study"]["seeds"] == [0]
+    assert stated == frozen(tmp_path) and stated["study"]["base"]["hidden"] == [32, 32]
     assert np.isclose(stated["study"]["env"]["randomisation"]["delay"][1], 0.04)
-    assert base_of(0) == "s0-base"
 
 
-def test_each_arm_of_the_papers_task_differs_by_what_it_says_and_is_tried(folder: Path, tmp_path: Path) -> None:
-    assert list(PAPER_ARMS) == list(PAPER_CHANGES)
-    settings = {arm: settings_of(Study(), f"paper-{arm}", False) for arm in PAPER_ARMS}
-    printed_env, printed_ppo = settings["printed"]
-    assert printed_ppo.initial_std == 1.0
-    assert settings["std"] == (printed_env, replace(printed_ppo, initial_std=0.2))
-    assert len({repr(own) for own in settings.values()}) == len(PAPER_ARMS)
-    motions = read_motions(folder)
-    jobs = paper_jobs(SMALL, motions)
-    longer = [job for job in jobs if job.steps == SMALL.base_steps]
-    assert [job.settings for job in longer] == [f"paper-{arm}" for arm in PAPER_LONGER]
-    for job in jobs:
-        if job.settings in ("paper-printed", "paper-floor"):
-            assert train(job, motions, SMALL, tmp_path)
-            write_trials(tmp_path / job.name, motions)
-    assert len({job.name for job in jobs if finished(tmp_path, job)}) == 2
-    with pytest.raises(BadInput, match="trials of every policy"):
-        paper_tables(tmp_path / "none", SMALL, motions)
-    assert len(paper_tables(tmp_path, SMALL, motions).splitlines()) == 2 + 2 * 2
-    for job in jobs:
-        if not (tmp_path / job.name).exists():
-            shutil.copytree(tmp_path / jobs[0].name, tmp_path / job.name)
-    lines = paper_tables(tmp_path, SMALL, motions).splitlines()
-    assert len(lines) == 2 + 2 * (len(PAPER_ARMS) + len(PAPER_LONGER))
-    assert lines[2].startswith("| as printed | trained | 6 | ")
+def test_a_run_goes_on_with_its_own_settings_alone_and_a_folder_without_one_is_one_line(tmp_path: Path) -> None:
+    freeze(tmp_path / "run", replace(SMALL, expert=7), motions="x")
+    with pytest.raises(BadInput, match=r"others: study\.expert 7"):
+        freeze(tmp_path / "run", SMALL, motions="x")
+    with pytest.raises(BadInput, match="the settings of a run, came no such file"):
+        frozen(tmp_path)
 
 
 def test_a_run_goes_on_with_settings_that_later_code_added(tmp_path: Path) -> None:
     stamp = freeze(tmp_path, SMALL, motions="x")
     began = json.loads((tmp_path / "study.json").read_text())
-    del began["study"]["ppo"]["captured"]
+    del began["study"]["env"]["sampler_floor"]
     (tmp_path / "study.json").write_text(json.dumps(began))
     later = freeze(tmp_path, SMALL, motions="x")
     assert later != stamp
     with pytest.raises(BadInput, match="motions"):
         freeze(tmp_path, SMALL, motions="y")
-
-
-def test_each_change_of_the_task_differs_by_what_it_says_and_is_held_against_the_base_policy(
-    folder: Path, tmp_path: Path
-) -> None:
-    assert set(SURVIVORS) == set(ROBUST_CHANGES)
-    base, ppo = settings_of(Study(), "ours", False)
-    settings = {arm: settings_of(Study(), f"robust-{arm}", False) for arm in SURVIVORS}
-    assert {own for _, own in settings.values()} == {ppo}
-    assert settings["judged"][0] == replace(base, place="own")
-    assert settings["loose"][0] == replace(base, threshold_end=0.8)
-    assert settings["history"][0].observation.history == 10
-    assert settings["place-history"][0].observation.now == ("demo_in_place",)
-    assert len({repr(own) for own, _ in settings.values()}) == len(SURVIVORS)
-    motions = read_motions(folder)
-    study = replace(SMALL, base_steps=512)
-    jobs = {job.name: job for job in robust_jobs(study, motions)}
-    tried = [jobs[name] for name in ("s0-base", "s0-place-history")]
-    for job in tried:
-        assert train(job, motions, study, tmp_path)
-        write_trials(tmp_path / job.name, motions)
-    text = robust_tables(tmp_path, study, motions)
-    assert "| own place, seeing it alone, ten steps | held out | 2 | " in text
-    assert "all sealed robots" not in text
-    for job in tried:
-        rows = pd.read_csv(tmp_path / job.name / "trials.csv").assign(sealed="x")
-        rows.to_csv(tmp_path / job.name / "sealed.csv", index=False)
-    assert "all sealed robots" in robust_tables(tmp_path, study, motions)

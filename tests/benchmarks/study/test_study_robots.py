@@ -1,7 +1,6 @@
-"""The study's robots: drawn by seed, sized by a search that goes on where it was ended, sealed."""
+"""Robots: drawn by seed, sized by a search that goes on where it was ended, sealed."""
 
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +9,10 @@ import pytest
 
 from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study import robots
-from benchmarks.study.jobs import base_of, experts_jobs
 from benchmarks.study.motions import LABELS, MOTIONS, read_motions
 from benchmarks.study.robots import ANKLES, GROUND, SMALL_CONFIG, Outcome, RobotsConfig, drawn, main, search, sized
-from benchmarks.study.settings import SMALL
-from benchmarks.study.training import train
 from bumblebee.errors import BadInput
+from bumblebee.learning import pretrained
 from bumblebee.stand_in.sealed import read_sealed
 from tests.benchmarks.study.study_folder import short_clips
 
@@ -24,15 +21,13 @@ CONFIG = RobotsConfig()
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four short motions in two clusters, and a policy of a few steps."""
+    """Four short motions in two clusters."""
     folder = tmp_path_factory.mktemp("motions")
     clips = short_clips(4)
     write_pack(folder / MOTIONS, [Packed("made", True, replace(clip, split="train")) for clip in clips])
     names = [clip.name for clip in clips]
     labels = pd.DataFrame({"name": names, "motion": names, "group": "made", "family": [c.family for c in clips]})
     labels.assign(split="train", seconds=1.0, cluster=["c0", "c0", "c1", "c1"]).to_csv(folder / LABELS, index=False)
-    motions = read_motions(folder)
-    train(experts_jobs(SMALL, motions)[0], motions, SMALL, folder)
     return folder
 
 
@@ -78,9 +73,9 @@ def test_the_search_ends_within_its_bounds_or_says_that_it_did_not() -> None:
 def test_a_run_that_was_ended_tries_nothing_twice_and_what_it_keeps_names_no_effect(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    motions, policy = read_motions(folder), folder / base_of(0)
+    motions, policy = read_motions(folder), pretrained.FOLDER
     config = replace(SMALL_CONFIG, at_least=0.0, at_most=1.0, max_seconds=0.2)
-    robots.seal_robots(policy, motions, config, tmp_path, SMALL, 1)
+    robots.seal_robots(policy, motions, config, tmp_path, 1)
     sealed = tmp_path / "robot-0.json"
     assert len(read_sealed(sealed)) == 5
     assert read_sealed(tmp_path / "declared.json") == []
@@ -91,21 +86,21 @@ def test_a_run_that_was_ended_tries_nothing_twice_and_what_it_keeps_names_no_eff
     with (tmp_path / "robot-0.tries.jsonl").open("a") as file:
         file.write('{"attempt": 0, "fac')
     monkeypatch.setattr(robots, "trial", lambda *_: pytest.fail("tried again"))
-    robots.seal_robots(policy, motions, config, tmp_path, SMALL, 1)
+    robots.seal_robots(policy, motions, config, tmp_path, 1)
     assert sealed.read_bytes() == before
-    with pytest.raises(BadInput, match=r"robots\.trial_seed"):
-        robots.seal_robots(policy, motions, replace(config, trial_seed=7), tmp_path, SMALL, 1)
+    with pytest.raises(BadInput, match=r"study\.trial_seed"):
+        robots.seal_robots(policy, motions, replace(config, trial_seed=7), tmp_path, 1)
     content = json.loads(before)
     content["effects"][0]["size"] *= 0.9
     sealed.write_text(json.dumps(content))
     with pytest.raises(BadInput, match=r"field sha256: expected .* The file was changed"):
-        robots.seal_robots(policy, motions, config, tmp_path, SMALL, 1)
+        robots.seal_robots(policy, motions, config, tmp_path, 1)
 
 
 def test_a_folder_without_a_policy_is_refused_before_anything_is_written(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    shutil.copytree(folder / base_of(0), tmp_path / "other", ignore=shutil.ignore_patterns("policy.pt"))
+    (tmp_path / "other").mkdir()
     with pytest.raises(SystemExit) as end:
         main([str(tmp_path / "other"), "--motions", str(folder), "--out", str(tmp_path / "new")])
     assert end.value.code == 2

@@ -6,8 +6,8 @@ import joblib
 import pytest
 
 from bumblebee.errors import BadInput
+from bumblebee.motion.reading.files import find_motions
 from bumblebee.motion.reading.inspect import Counts, inspect
-from bumblebee.motion.reading.listing import find_motions
 from bumblebee.motion.reading.one_file import FileConfig
 from bumblebee.motion.store import write_library
 from tests.motion.human.people import bvh

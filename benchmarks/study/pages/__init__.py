@@ -1,1 +1,0 @@
-"""Pages of the study: tables and curves with intervals, a file each."""
