@@ -7,11 +7,15 @@ two differ most, the command matters most, and there one of them is nearer to wh
 What the model lacks besides (friction, strength, masses) is in both. Where that is so much that the nearer one misses
 by more than the two are apart, the model cannot tell. Contacts are left out: a declared one may be closed where nothing
 touches, and then decides on both.
+
+A floating base moves by contacts that no log has, and cannot be simulated so. What a limb that touches nothing asks of
+its joint follows from the measured motion alone, though (`free_limb.py`), and that torque is compared instead.
 """
 
 import mujoco
 import numpy as np
 
+from bumblebee.measured.checks.free_limb import torque_asked
 from bumblebee.measured.checks.units import servo_gains
 from bumblebee.measured.checks.view import View
 
@@ -28,7 +32,7 @@ def share_for_reversed(view: View, joint: int, by_target: bool) -> float | None:
     It is 0 or nearly so where the sign is right, whatever swings the joint; 0.7 and more where the command or the joint
     is reversed.
     """
-    return share_for_multiple(view, joint, by_target, -1.0)
+    return share_on_limb(view, joint, by_target) if view.floating else share_for_multiple(view, joint, by_target, -1.0)
 
 
 def share_for_multiple(view: View, joint: int, by_target: bool, factor: float) -> float | None:
@@ -47,12 +51,29 @@ def share_for_multiple(view: View, joint: int, by_target: bool, factor: float) -
     starts = np.unique(np.linspace(0, view.rollout.frames - 1 - window, STRETCHES).astype(int))
     moved = view.rollout.joint_vel[starts + window, joint] - view.rollout.joint_vel[starts, joint]
     plain, other = (_predicted(view, torque, starts, window, joint, sign) for sign in (1.0, factor))
+    return _share(moved, plain, other)
+
+
+def share_on_limb(view: View, joint: int, by_target: bool) -> float | None:
+    """Share for a joint of a floating robot, by the torque that its limb asks; None where the robot stands on it."""
+    torque = _Torque(view, by_target)
+    window = view.window(SPAN)
+    starts = np.unique(np.linspace(0, view.rollout.frames - 1 - window, STRETCHES).astype(int))
+    asked = torque_asked(view, joint, starts, window) if torque.known[joint] else None
+    if asked is None:
+        return None
+    plain, other = (_given(view, torque, starts, window, joint, sign) for sign in (1.0, -1.0))
+    return _share(asked, plain, other)
+
+
+def _share(measured: np.ndarray, plain: np.ndarray, other: np.ndarray) -> float | None:
+    """Share of the stretches (N,) that `other` comes nearer to, of those in which it is furthest from `plain`."""
     apart = np.abs(plain - other)
     good = np.isfinite(apart)
     if good.mean() < MATTERS or not apart[good].any():
         return None
     matters = good & (apart >= np.quantile(apart[good], 1 - MATTERS)) & (apart > 0)
-    misses = np.abs(moved - plain)[matters], np.abs(moved - other)[matters]
+    misses = np.abs(measured - plain)[matters], np.abs(measured - other)[matters]
     if np.median(np.minimum(*misses)) > np.median(apart[matters]):
         return None
     return float((misses[1] < misses[0]).mean())
@@ -74,6 +95,14 @@ class _Torque:
         given = sign * self.command[row]
         raw = self.kp * (given - place) - self.kd * speed if self.by_target else given
         return np.clip(raw, -self.limit, self.limit)
+
+
+def _given(view: View, torque: _Torque, starts: np.ndarray, window: int, joint: int, sign: float) -> np.ndarray:
+    """Mean torque (N,) of a drive over the stretches by the measured states, its command times `sign` [N m, N]."""
+    rollout, signs = view.rollout, np.full(len(view.rollout.joints), sign)
+    rows = [torque.at(k, rollout.joint_pos[k], rollout.joint_vel[k], signs)[joint] for k in range(rollout.frames)]
+    total = np.concatenate([[0.0], np.cumsum(rows)])
+    return (total[starts + window] - total[starts]) / window
 
 
 def _drives(view: View) -> list[int]:

@@ -76,9 +76,10 @@ class Thresholds:
     servo and weak motors leave more, a slow reference that is tracked without error a twentieth of it."""
     response_correlation: float = 0.3
     """Correlation of command and position changes over 0.1 s from which a joint is seen to follow its command."""
-    response_model: float = 0.35
+    response_model: float = 0.5
     """Share of short stretches that the declared model predicts better with the command reversed, below which it speaks
-    for the command as logged: joints that swing with their neighbours give 0, reversed ones 0.68 to 1."""
+    for the command as logged: joints that swing with their neighbours give 0, reversed ones 0.68 to 1; the waist of a
+    robot that balances by it gives up to 0.43, reversed 0.57 and more."""
     follow_gain: float = 0.45
     """Share of the tracking error that may remain under the negative target, to call a joint reversed by it."""
     follow_error: float = 0.08
