@@ -109,7 +109,10 @@ def run(options: argparse.Namespace) -> None:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Both states by robot and group, with 95 % intervals; ratios are now / before, geometric means."""
+    """Both states by robot and group, with 95 % intervals; ratios are now / before, geometric means.
+
+    Effects outside the catalogue have no name: of them those that were flagged are counted.
+    """
     lines = ["| robot, group | cases | named first, before | now | strange names, before | now | error | time |"]
     lines.append("|---" * 8 + "|")
     keys = sorted({(row["robot"], row["group"]) for row in rows}, key=lambda k: (k[0], GROUPS.index(k[1])))
@@ -125,7 +128,9 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _first(rows: Sequence[dict[str, Any]], state: str) -> str:
-    return _share([row[state]["top"] for row in rows])
+    return _share(
+        [row[state]["outside"]["flagged"] if row["group"] == "outside" else row[state]["top"] for row in rows]
+    )
 
 
 def _share(hits: Sequence[bool]) -> str:

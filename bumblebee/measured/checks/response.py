@@ -21,7 +21,7 @@ from bumblebee.measured.checks.units import servo_gains
 from bumblebee.measured.checks.view import View
 from bumblebee.quaternions import conjugate, rotate_by_cross
 
-MIRRORED = -0.9  # correlation of the changes of a position that follows its target's negative
+MIRRORED = -0.9  # correlation of a position's changes with its target's, and less it of the model's stretches
 NOT_ALONG = 2.0  # standard errors: from here on a joint's acceleration is seen to go along with its command
 ROWS_EACH = 1.5  # rows for every column of the regression: with fewer it explains anything
 TICK, LASTING = 0.02, 0.1  # s between rows, s over which residuals are taken to hang together
@@ -34,8 +34,9 @@ def check_response(view: View) -> None:
 
     Fatal where the whole state could be taken into account and the declared model agrees, which moves so by itself
     where neighbours drive the joint; where that cannot tell, the changes of position and target must clearly oppose
-    each other. Of a floating base, whose contacts no log has, no model is asked. In a file too short for the whole
-    state a person is told, as where a position merely follows the negative target.
+    each other. Of a floating base, whose contacts no log has, the model is asked of limbs that touch nothing. In a file
+    too short for the whole state a person is told, as where a position merely follows the negative target, or where the
+    model alone says so: a hand that presses on a table goes against what its limb asks, too.
     """
     rollout, limits = view.rollout, view.limits
     by_target = rollout.joint_target is not None
@@ -57,11 +58,14 @@ def check_response(view: View) -> None:
         opposed = z < -limits.response_z and late < -limits.response_late
         against = strong and opposed and (not by_target or together < limits.response_correlation)
         mirrored = by_target and z < NOT_ALONG and together < MIRRORED and _follows_negative(view, place, given)
-        if against or mirrored:
-            share = share_for_reversed(view, joint, by_target) if against else None
+        share = share_for_reversed(view, joint, by_target) if against or (by_target and view.floating) else None
+        turned = not against and share is not None and share >= -MIRRORED and together < limits.response_correlation
+        if against or mirrored or turned:
             opposes = by_target and together < -limits.response_correlation
             sure = against and (opposes or view.floating if share is None else share >= limits.response_model)
             came = f"motion against it ({-z:.0f} standard errors, correlation of the changes {together:.2f})"
+            if turned:
+                came = f"one that the declared model takes for its negative in {share:.0%} of short stretches"
             column = view.label(name, joint)
             view.add(
                 column,

@@ -90,8 +90,8 @@ class _Torque:
         self.limit = torque_limits(view)
         self.known = self.kp > 0 if by_target else np.ones(len(rollout.joints), dtype=bool)
 
-    def at(self, row: int, place: np.ndarray, speed: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """(J,) [N m, N] under the commands of a row times `sign` (J,)."""
+    def at(self, row: int | slice, place: np.ndarray, speed: np.ndarray, sign: np.ndarray) -> np.ndarray:
+        """(J,) [N m, N] under the commands of a row times `sign` (J,); (T, J) of several rows."""
         given = sign * self.command[row]
         raw = self.kp * (given - place) - self.kd * speed if self.by_target else given
         return np.clip(raw, -self.limit, self.limit)
@@ -100,7 +100,7 @@ class _Torque:
 def _given(view: View, torque: _Torque, starts: np.ndarray, window: int, joint: int, sign: float) -> np.ndarray:
     """Mean torque (N,) of a drive over the stretches by the measured states, its command times `sign` [N m, N]."""
     rollout, signs = view.rollout, np.full(len(view.rollout.joints), sign)
-    rows = [torque.at(k, rollout.joint_pos[k], rollout.joint_vel[k], signs)[joint] for k in range(rollout.frames)]
+    rows = torque.at(slice(None), rollout.joint_pos, rollout.joint_vel, signs)[:, joint]
     total = np.concatenate([[0.0], np.cumsum(rows)])
     return (total[starts + window] - total[starts]) / window
 

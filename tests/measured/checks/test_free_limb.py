@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.measured.checks import Thresholds
+from bumblebee.measured.checks import Thresholds, check_rollout
 from bumblebee.measured.checks.reversed_command import share_for_reversed
 from bumblebee.measured.checks.view import View
 from bumblebee.measured.rollout import Rollout
@@ -68,3 +68,10 @@ def test_the_leg_that_the_robot_stands_on_tells_nothing() -> None:
 
 def test_without_the_direction_of_the_base_nothing_is_told() -> None:
     assert share(replace(record(0), base_quat=None), 1) is None
+
+
+def test_a_trunk_that_goes_by_its_command_turned_round_is_pointed_out_and_a_person_decides() -> None:
+    turned = replace(record(0), joint_target=record(0).joint_target * [1, -1])
+    found = [f for f in check_rollout(turned, model()) if f.rule == "response-sign"]
+    assert [f.column for f in found] == ["joint_target[waist]"]
+    assert not [f for f in check_rollout(record(0), model()) if f.rule == "response-sign"]
