@@ -52,10 +52,8 @@ def test_the_table_counts_names_intervals_and_ratios():
         row(2, (False, False), (1, 1), "outside"),
     ]
     text = table(rows)
-    assert (
-        "| arm, single | 2 | 1 of 2 [0.09, 0.91] | 2 of 2 [0.34, 1.00] | 1 | 0 | 1.00 [1.00, 1.00] | 1.00 [0.50, 2.00] |"
-        in text
-    )
+    assert "| arm, single | 2 | 1 of 2 [0.09, 0.91] | 2 of 2 [0.34, 1.00] | 1 | 0 | " in text
+    assert "| 1.00 [1.00, 1.00] | 1.00 [0.50, 2.00] |" in text
     assert "| arm, outside | 1 | 1 of 1" in text
     assert "before 1 of 2" in text and "now 2 of 2" in text
 
