@@ -40,9 +40,8 @@ def solve(system: System, ridge: float) -> Tensor:
     matrix = left.reshape(features * joints, features * joints)
     damping = (ridge * torch.diagonal(matrix).mean()).clamp(min=LEAST)
     right = (system.features.T @ pull).reshape(-1)
-    return torch.linalg.solve(matrix + damping * torch.eye(len(matrix), dtype=matrix.dtype), right).reshape(
-        features, joints
-    )
+    root = torch.linalg.cholesky(matrix + damping * torch.eye(len(matrix), dtype=matrix.dtype))
+    return torch.cholesky_solve(right[:, None], root).reshape(features, joints)
 
 
 def misfit(system: System, coefficients: Tensor) -> float:
