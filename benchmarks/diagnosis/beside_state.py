@@ -12,7 +12,6 @@ OUT/results.jsonl.
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -33,8 +32,10 @@ from benchmarks.undeclared.sight import problem_of
 from benchmarks.undeclared.stats import bootstrap, wilson
 from bumblebee.diagnosis.dataset import make_session
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.io.write import write_file
 from bumblebee.measured.rollout import write_rollout
 from bumblebee.sim.effects import read_effects
+from bumblebee.stand_in.undeclared.kinds import KINDS
 
 STATES = ("before", "now")
 GROUPS = ("single", "pair", "triple", "null", "outside")
@@ -56,13 +57,13 @@ def write_case(folder: Path, drawn: Drawn) -> None:
         place = folder / "rollouts" / f"{rollout.rollout_id}.parquet"
         if not place.exists():
             write_rollout(place, rollout)
-    (folder / "model.xml").write_text(drawn.robot.spec.to_xml(), encoding="utf-8")
+    write_file(folder / "model.xml", drawn.robot.spec.to_xml())
 
 
 def diagnosed(tree: Path, folder: Path, out: Path) -> tuple[dict[str, Any], float]:
     """`out`/diagnosis.json by the code in `tree`, empty where it broke, and the processor's seconds."""
-    command = [sys.executable, "-P", "-m", "bumblebee", "diagnose", str(folder / "model.xml"), str(folder)]
-    os.environ["PYTHONPATH"] = str(tree)
+    python = ["env", f"PYTHONPATH={tree}", sys.executable, "-P"]  # -P: this checkout does not come before the tree
+    command = [*python, "-m", "bumblebee", "diagnose", str(folder / "model.xml"), str(folder)]
     try:
         _, seconds, _ = cost([*command, "--overwrite", "--out", str(out)])
     except CalledProcessError:
@@ -96,14 +97,15 @@ def run(options: argparse.Namespace) -> None:
         raise BadInput(f"--other {options.other}", "a checkout of another state", "no folder bumblebee in it")
     options.out.mkdir(parents=True, exist_ok=True)
     results = options.out / "results.jsonl"
-    done = {(row["seed"], row["case"]) for row in read_lines(results)} if results.exists() else set()
+    rows = read_lines(results) if results.exists() else []
+    done = {(row["seed"], row["case"]) for row in rows}
     for robot in options.robot:
         for case in list(cases(options.seed, [robot], options.without))[: options.cases]:
             if (options.seed, case.number) in done:
                 continue
             line = compare(case, options.seed, trees, options.out / f"{options.seed}-{case.number:04d}")
-            with results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(line) + "\n")
+            rows.append(line)
+            write_file(results, "".join(json.dumps(row) + "\n" for row in rows))
             told = ", ".join(f"{state} {line[state]['named']} in {line[state]['seconds']:.0f} s" for state in STATES)
             print(f"{case.number} {case.robot} {'+'.join(case.kinds) or case.group}: {told}", flush=True)
 
@@ -160,7 +162,9 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="the suite's seed")
     parser.add_argument("--robot", nargs="+", default=["arm"], choices=("arm", "stand"), help="robots, in turn")
     parser.add_argument("--cases", type=int, default=40, help="cases a robot, from the first on")
-    parser.add_argument("--without", nargs="*", default=[], help="kinds that are left out")
+    parser.add_argument(
+        "--without", nargs="*", default=[], choices=sorted(KINDS), metavar="KIND", help="kinds that are left out"
+    )
     options = parser.parse_args(argv)
     try:
         if options.table:

@@ -19,7 +19,7 @@ from benchmarks.retarget.landmarks import person_of, robot_landmarks, scaled
 from benchmarks.retarget.table import markdown, summary
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.filters.quality import at_times, joint_error, keypoint_error, quality
-from bumblebee.motion.formats.convert import clip_of
+from bumblebee.motion.formats.convert import noted_clip
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.raw import RawMotion
@@ -90,7 +90,7 @@ def people(path: Path, references: Mapping[str, Clip]) -> list[tuple[HumanMotion
             if isinstance(motion, HumanMotion):
                 found.append((motion, references.get(motion.name)))
             elif isinstance(motion, RawMotion):
-                clip, _ = clip_of(motion, FPS)
+                clip, _ = noted_clip(motion, FPS)
                 found.append((person_of(clip), clip))
     return found
 
@@ -107,7 +107,7 @@ def main() -> None:
     raws = (
         {raw.name: raw for file in find_motions(options.reference) for raw in file.motions} if options.reference else {}
     )
-    motions = people(options.path, {name: clip_of(raw, FPS)[0] for name, raw in raws.items()})[:: options.every]
+    motions = people(options.path, {name: noted_clip(raw, FPS)[0] for name, raw in raws.items()})[:: options.every]
     found = compare({text: named(text) for text in options.retargeters}, motions)
     if raws:
         theirs = {m.name: against(m, raws[m.name], reference) for m, reference in motions if m.name in raws}

@@ -13,7 +13,7 @@ from benchmarks.retarget.compare import FPS
 from benchmarks.retarget.landmarks import scaled
 from bumblebee.errors import BadInput
 from bumblebee.motion.filters.quality import at_times
-from bumblebee.motion.formats.convert import clip_of
+from bumblebee.motion.formats.convert import noted_clip
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.reading.files import find_motions
 from bumblebee.motion.retarget.retarget import retarget
@@ -34,7 +34,7 @@ _TITLE = 36  # pixels
 
 def strip(motion: HumanMotion, panels: int) -> Image.Image:
     """Two rows of pictures of one motion, the person above the robot."""
-    clip, _ = clip_of(retarget(motion, FPS), FPS)
+    clip, _ = noted_clip(retarget(motion, FPS), FPS)
     rows = np.linspace(0, clip.frames - 1, panels + 2).round().astype(int)[1:-1]
     frames, _ = pictures(clip, rows)
     height, width = frames.shape[1:3]

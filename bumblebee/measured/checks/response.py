@@ -21,7 +21,7 @@ from bumblebee.measured.checks.units import servo_gains
 from bumblebee.measured.checks.view import View
 from bumblebee.quaternions import conjugate, rotate_by_cross
 
-MIRRORED = -0.9  # correlation of a position's changes with its target's, and less it of the model's stretches
+MIRRORED = -0.9  # correlation of the changes of a position that follows its target's negative
 NOT_ALONG = 2.0  # standard errors: from here on a joint's acceleration is seen to go along with its command
 ROWS_EACH = 1.5  # rows for every column of the regression: with fewer it explains anything
 TICK, LASTING = 0.02, 0.1  # s between rows, s over which residuals are taken to hang together
@@ -59,7 +59,7 @@ def check_response(view: View) -> None:
         against = strong and opposed and (not by_target or together < limits.response_correlation)
         mirrored = by_target and z < NOT_ALONG and together < MIRRORED and _follows_negative(view, place, given)
         share = share_for_reversed(view, joint, by_target) if against or (by_target and view.floating) else None
-        turned = not against and share is not None and share >= -MIRRORED and together < limits.response_correlation
+        turned = not against and share is not None and share >= limits.response_model
         if against or mirrored or turned:
             opposes = by_target and together < -limits.response_correlation
             sure = against and (opposes or view.floating if share is None else share >= limits.response_model)

@@ -29,8 +29,8 @@ MATTERS = 0.5  # share of the stretches, those in which the command's sign chang
 def share_for_reversed(view: View, joint: int, by_target: bool) -> float | None:
     """Share of the stretches that the command reversed predicts better; None where the model cannot tell.
 
-    It is 0 or nearly so where the sign is right, whatever swings the joint; 0.7 and more where the command or the joint
-    is reversed.
+    It is 0 or nearly so where the sign is right, whatever swings the joint, up to a third where the robot balances by
+    it; 0.7 and more where the command or the joint is reversed.
     """
     return share_on_limb(view, joint, by_target) if view.floating else share_for_multiple(view, joint, by_target, -1.0)
 
@@ -47,8 +47,7 @@ def share_for_multiple(view: View, joint: int, by_target: bool, factor: float) -
     torque = _Torque(view, by_target)
     if not torque.known[joint]:
         return None
-    window = view.window(SPAN)
-    starts = np.unique(np.linspace(0, view.rollout.frames - 1 - window, STRETCHES).astype(int))
+    starts, window = _stretches(view)
     moved = view.rollout.joint_vel[starts + window, joint] - view.rollout.joint_vel[starts, joint]
     plain, other = (_predicted(view, torque, starts, window, joint, sign) for sign in (1.0, factor))
     return _share(moved, plain, other)
@@ -57,13 +56,18 @@ def share_for_multiple(view: View, joint: int, by_target: bool, factor: float) -
 def share_on_limb(view: View, joint: int, by_target: bool) -> float | None:
     """Share for a joint of a floating robot, by the torque that its limb asks; None where the robot stands on it."""
     torque = _Torque(view, by_target)
-    window = view.window(SPAN)
-    starts = np.unique(np.linspace(0, view.rollout.frames - 1 - window, STRETCHES).astype(int))
+    starts, window = _stretches(view)
     asked = torque_asked(view, joint, starts, window) if torque.known[joint] else None
     if asked is None:
         return None
     plain, other = (_given(view, torque, starts, window, joint, sign) for sign in (1.0, -1.0))
     return _share(asked, plain, other)
+
+
+def _stretches(view: View) -> tuple[np.ndarray, int]:
+    """First rows (N,) of the stretches, and how many rows each has."""
+    window = view.window(SPAN)
+    return np.unique(np.linspace(0, view.rollout.frames - 1 - window, STRETCHES).astype(int)), window
 
 
 def _share(measured: np.ndarray, plain: np.ndarray, other: np.ndarray) -> float | None:

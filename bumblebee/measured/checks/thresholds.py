@@ -79,7 +79,7 @@ class Thresholds:
     response_model: float = 0.5
     """Share of short stretches that the declared model predicts better with the command reversed, below which it speaks
     for the command as logged: joints that swing with their neighbours give 0, reversed ones 0.68 to 1; the waist of a
-    robot that balances by it gives up to 0.43, reversed 0.57 and more."""
+    robot that balances by it gives up to 0.32, reversed 0.68 and more."""
     follow_gain: float = 0.45
     """Share of the tracking error that may remain under the negative target, to call a joint reversed by it."""
     follow_error: float = 0.08

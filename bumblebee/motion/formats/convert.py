@@ -15,7 +15,7 @@ from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licences.table import LICENCES, Stated, read_table, table_of
 from bumblebee.motion.raw import RawMotion
-from bumblebee.motion.reading import clips
+from bumblebee.motion.reading.clips import clip_of
 from bumblebee.motion.reading.file import File, Motion, reason_of
 from bumblebee.motion.reading.files import find_motions
 from bumblebee.motion.reading.naming import Names
@@ -120,7 +120,7 @@ def _ours(out: Path, to: str) -> bool:
     return bool(written) and names <= {LICENCES, *written}
 
 
-def clip_of(raw: RawMotion, fps: float | None, file: File | None = None) -> tuple[Clip, tuple[str, ...]]:
+def noted_clip(raw: RawMotion, fps: float | None, file: File | None = None) -> tuple[Clip, tuple[str, ...]]:
     """A motion of the robot, checked and at another rate, as a clip, and the notes on it and its captions.
 
     Heights stay as they are.
@@ -131,7 +131,7 @@ def clip_of(raw: RawMotion, fps: float | None, file: File | None = None) -> tupl
     raw = usable(raw)
     raw = resample(raw, fps or raw.fps)
     texts = beside(raw.file, (len(raw.root_pos) - 1) / raw.fps)
-    return clips.clip_of(raw, file or File(raw.file), texts), (*raw.notes, *texts.notes)
+    return clip_of(raw, file or File(raw.file), texts), (*raw.notes, *texts.notes)
 
 
 def clips_at(
@@ -176,7 +176,7 @@ def _clip(motion: Motion, file: File, config: ConvertConfig) -> tuple[Clip, tupl
     if isinstance(motion, HumanMotion):
         motion = retarget(motion, config.rate or _LIBRARY_FPS)
     if isinstance(motion, RawMotion):
-        return clip_of(motion, config.rate, file)
+        return noted_clip(motion, config.rate, file)
     if config.rate is None or config.rate == motion.fps:
         return motion, ()
     raw = RawMotion(motion.name, motion.fps, motion.root_pos, motion.root_quat, motion.joint_pos, file.path)

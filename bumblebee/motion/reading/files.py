@@ -1,4 +1,4 @@
-"""The files at a path, one after the other, each with its bytes or why it has none; the tree is walked here alone."""
+"""The files at a path, one after the other, each with its bytes or why it has none, for all that reads motions."""
 
 import hashlib
 import os

@@ -27,8 +27,7 @@ def trees(tmp_path: Path) -> dict[str, Path]:
     return {state: tmp_path / state for state in beside_state.STATES}
 
 
-def test_each_state_is_that_of_its_checkout_and_one_that_breaks_is_a_result(trees, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", "")
+def test_each_state_is_that_of_its_checkout_and_one_that_breaks_is_a_result(trees, tmp_path):
     for state, tree in trees.items():
         document, seconds = diagnosed(tree, tmp_path / "case", tmp_path / f"case-{state}")
         assert document["state"] == state and seconds > 0
