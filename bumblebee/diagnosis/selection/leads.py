@@ -11,7 +11,7 @@ from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.moves import Terms, refitted
-from bumblebee.diagnosis.selection.proposals.all_joints import all_joints_of, is_nearer, is_told_torques
+from bumblebee.diagnosis.selection.proposals.all_joints import all_joints_of, is_fixed, is_nearer
 from bumblebee.diagnosis.selection.proposals.gain_grid import far_gains
 from bumblebee.diagnosis.selection.rounds import SINGLE, Kept, Round, ask
 from bumblebee.diagnosis.selection.state import SearchState
@@ -89,8 +89,8 @@ def leads(
 
 
 def _standard(run: SearchState, tried: Sequence[Trial]) -> Fit | None:
-    """Standard parameters where torques are logged and the model is far off, if no trial comes near; only sure ones."""
-    if run.power() < run.config.far or not is_told_torques(run.problem):
+    """Standard parameters of a robot on a fixed base whose model is far off, if no trial comes near; only sure ones."""
+    if run.power() < run.config.far or not is_fixed(run.problem):
         return None
     fit = go(run, all_joints_of)
     if fit is None or not is_nearer(run, fit, tried):

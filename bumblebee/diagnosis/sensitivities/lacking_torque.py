@@ -1,8 +1,9 @@
 """The torque that the declared model lacks where the joints were measured to be: by inverse dynamics, not simulation.
 
-Where torques are logged, a model that is far from the data is no further off than one that is near: nothing flies.
+A model that is far from the data is no further off here than one that is near: nothing flies.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,18 +13,40 @@ from bumblebee.diagnosis.sensitivities.impulse_responses import Path, commanded
 from bumblebee.diagnosis.sensitivities.torque_signatures import Signatures
 from bumblebee.diagnosis.simulation import vary
 from bumblebee.diagnosis.thresholds.sensitivities import Impulses
+from bumblebee.sim.effects import Effect
 
 
 @dataclass(frozen=True, eq=False)
 class LackingTorque:
     """Means over segments of W windows."""
 
+    problem: Problem
     signatures: Signatures
     """Torques that effects would be on the measured path."""
-    torque: np.ndarray
-    """(W, S, nv) [N m]."""
     asked: np.ndarray
     """(W, S, nv) that the motion asks of the declared model's drives [N m]."""
+
+    def after(self, effects: Sequence[Effect] = ()) -> np.ndarray:
+        """What is lacking (W, S, nv) [N m] by the commands as `effects` make them arrive."""
+        plant, of = self.problem.plant, self.signatures
+        control, _ = commanded(self.problem.windows, vary(plant, effects), of.path.step, len(of.path.edges) - 1)
+        lacking = self.asked.copy()
+        lacking[..., plant.dof] -= of.path.mean(of.servos.torque(of.q, of.v, of.servos.controls(control)))
+        return lacking
+
+    def damped(self) -> np.ndarray:
+        """Torque (W, S, nv) [N m] of the servos' damping."""
+        damped = np.zeros_like(self.asked)
+        damped[..., self.problem.plant.dof] = self.signatures.path.mean(
+            self.signatures.servos.bias[..., 2] * self.signatures.v
+        )
+        return damped
+
+    def moving(self) -> np.ndarray:
+        """How far (W, S, nv) each joint moves in one direction, 0 to 1: at rest any friction is as large as it must."""
+        moving = np.ones_like(self.asked)
+        moving[..., self.problem.plant.dof] = self.signatures.path.mean(self.signatures.sign) ** 2
+        return moving
 
 
 def lacking_torque(problem: Problem) -> LackingTorque:
@@ -36,9 +59,7 @@ def lacking_torque(problem: Problem) -> LackingTorque:
         where = problem.windows.condition == number
         asked[where] = signatures.inverse_dynamics(under.model)[where]
     asked[..., plant.dof] += plant.model.dof_frictionloss[plant.dof] * path.mean(signatures.sign)
-    lacking = asked.copy()
-    lacking[..., plant.dof] -= path.mean(signatures.torque)
-    return LackingTorque(signatures, lacking, asked)
+    return LackingTorque(problem, signatures, asked)
 
 
 def _measured_path(problem: Problem, rule: Impulses) -> Path:

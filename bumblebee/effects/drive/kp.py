@@ -20,6 +20,7 @@ class Kp(Kind):
     parameters = (Parameter("factor", "", 1e-3, 20.0),)
     absent = 1.0
     drive = "position"
+    standard = "drive"
     experiment = "vary kp and hold a known load"
     law = Law(fixed((("u - q",), TARGET, 1)), "", driven=True)
 

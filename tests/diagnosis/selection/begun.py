@@ -1,7 +1,6 @@
 """A search at its beginning, on rollouts of the arm."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, TypeVar
 
@@ -14,7 +13,6 @@ from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.changes import Asking, Change
 from bumblebee.diagnosis.selection.state import SearchState
-from bumblebee.diagnosis.thresholds import Thresholds
 from tests.diagnosis import arm
 
 T = TypeVar("T")
@@ -50,11 +48,3 @@ def answered(step: Asking[T], make: Callable[[Change], object] = lambda change: 
             return end.value, asked
         asked.append(change)
         make(change)
-
-
-def large_robots() -> Thresholds:
-    """Thresholds by which every robot is large."""
-    some = Thresholds()
-    rules = some.selection.proposals
-    whole = replace(rules.all_joints, small_robot=0)
-    return replace(some, selection=replace(some.selection, proposals=replace(rules, all_joints=whole)))

@@ -11,42 +11,31 @@ class AllJoints:
     """Number of windows used for the coarse fit."""
     steps: int = 9
     """Steps of Levenberg's and Marquardt's way at most."""
-    steps_of_small: int = 20
-    """Steps of Levenberg's and Marquardt's way at most for a small robot: every joint lacks armature and friction."""
     steps_with_links: int = 5
     """Steps of that way with the links' effects, which begin from the joints'."""
     rounds: int = 3
     """Rounds of fitting on all windows and taking out what is not sure there; of weighing joints by what is left."""
-    small_robot: int = 12
-    """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
     still_off: float = 2.0
-    """Median chi-square that is much: of a small robot a load alone leaves less, or it is set beside others; strengths
-    and gains follow, the way is gone from the other end, and masses of all links come in."""
-    off_of_large: float = 4.0
-    """Median chi-square of a large robot from which on the noise does not measure what is sure."""
-    load_leaves: float = 0.5
-    """Share of the declared model's median chi-square below which a load on one link is worth a place beside others."""
+    """Median chi-square that is much: above it the noise does not measure what is sure, and no search begins there."""
+    off: float = 4.0
+    """Median chi-square on a free base from which on the noise does not measure what is sure."""
     load_takes: float = 0.04
-    """Share of the cost that a link's mass must take away beside all joints' effects of a large robot; by slopes no
+    """Share of the cost that a link's mass must take away beside all joints' effects on a free base; by slopes no
     mass takes more than .002 to .014 where all are right, one to three kilograms on a G1's torso .08 to .42."""
     most_loads: int = 4
     """Masses asked together at most: a trunk, hands and a head."""
-    rotors: float = 30.0
-    """Armatures, in their steps, from which the way is gone a second time: heavier than the links."""
-    next_to_nothing: float = 0.02
+    little: float = 0.05
     """Share of the declared model's median chi-square that all joints' effects leave less of where they come first."""
-    little_of_large: float = 0.05
-    """Share of the median chi-square for a large robot, whitened around a model further from the truth."""
-    enough_of_large: float = 0.05
-    """Share of the median chi-square above which a large robot's strengths and kp are asked, too."""
+    enough: float = 0.05
+    """Share of the median chi-square above which strengths and kp are asked on a free base, too."""
     likely_dry: float = 0.01
-    """Share of a drive's limit at which a large robot's dry friction begins; the robots of
+    """Share of a drive's limit at which dry friction begins on a free base; the robots of
     `benchmarks.from_a_drawing` have .5 to 5 %."""
     holding: tuple[float, ...] = (0.005, 0.01, 0.02, 0.04)
     """Shares of a drive's limit that dry friction is tried at where twice the servo's damping or more holds a joint."""
     nearer: float = 0.3
     """Share of the cost that the best effect by itself leaves, which all joints' must leave less of; share of the
-    declared model's below which an effect of the whole of a large robot comes first."""
+    declared model's below which an effect of the whole robot comes first on a free base."""
     one_damping: float = 0.05
     """Share by which the cost may grow where kd and a joint's viscous friction become one."""
 

@@ -55,7 +55,7 @@ def _far_off(windows: int) -> SearchState:
 
 def test_gains_that_are_far_off_stay_gains_where_all_joints_leave_no_less(monkeypatch: pytest.MonkeyPatch) -> None:
     run = _far_off(15)
-    monkeypatch.setattr(start, "fit_all_joints", lambda *_: run.fit)  # which leaves what the declared model leaves
+    monkeypatch.setattr(start, "simulated", lambda *_: run.fit)  # which leaves what the declared model leaves
     _with_gains(run)
 
 

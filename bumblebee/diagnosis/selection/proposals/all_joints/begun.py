@@ -17,7 +17,6 @@ from bumblebee.sim.servo import servos_of
 
 _STRENGTH = "motor_strength"
 _GAIN = "kp"
-ROTOR = "armature"
 Begun = tuple[Sequence[Candidate], np.ndarray]
 """Effects and the values (P,) that their fit begins with."""
 
@@ -32,19 +31,7 @@ def is_whole(c: Candidate) -> bool:
     return c.effect != "link_mass" or c.step[1] != 0
 
 
-def sets_of_small(
-    usual: Sequence[Candidate], candidates: Sequence[Candidate], loads: Sequence[Fit]
-) -> list[list[Begun]]:
-    """Usual effects at every drive's declared strength; beside a load; with strengths; with servos' `kp` for those."""
-    declared = [c for c in usual if c.effect != _STRENGTH]
-    gains = [c for c in candidates if c.effect == _GAIN]
-    loaded = [_beside_load(load, declared) for load in loads]
-    sets = [declared, list(usual), [*declared, *gains] if gains else []]
-    begun: list[list[Begun]] = [[(s, absent(s))] for k, s in enumerate(sets) if s and s not in sets[:k]]
-    return [begun[0], loaded, *begun[1:]]
-
-
-def sets_of_large(usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> tuple[list[Candidate], ...]:
+def sets_of(usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> tuple[list[Candidate], ...]:
     """Usual effects at every drive's declared strength; then what comes beside them: strengths, and servos' `kp`."""
     strengths = [c for c in usual if c.effect == _STRENGTH]
     gains = [c for c in candidates if c.effect == _GAIN]
@@ -52,7 +39,7 @@ def sets_of_large(usual: Sequence[Candidate], candidates: Sequence[Candidate]) -
 
 
 def likely_values(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
-    """Values (P,) from which a large robot's fit begins: rotors and friction of likely sizes where none is declared.
+    """Values (P,) from which the fit of a free base begins: rotors and friction of likely sizes where none is declared.
 
     From none at all the way leads past the truth: a joint without a rotor follows its servo at once, and one that
     hardly moves is held by any viscous friction that is large enough. A servo is tuned for what it moves: a rotor
@@ -83,7 +70,7 @@ def _dry(problem: Problem, joint: int) -> float:
     return share * limit if np.isfinite(limit) else 0.0
 
 
-_LIKELY: dict[str, Callable[[Problem, int], float]] = {ROTOR: _rotor, "coulomb_friction": _dry}
+_LIKELY: dict[str, Callable[[Problem, int], float]] = {"armature": _rotor, "coulomb_friction": _dry}
 
 
 def beside(fit: Fit, others: Sequence[Candidate]) -> Begun:
@@ -91,13 +78,3 @@ def beside(fit: Fit, others: Sequence[Candidate]) -> Begun:
     there = {(c.effect, c.where) for c in fit.chosen}
     more = [c for c in others if (c.effect, c.where) not in there]
     return [*fit.chosen, *more], np.concatenate((fit.values, absent(more)))
-
-
-def _beside_load(load: Fit, others: Sequence[Candidate]) -> Begun:
-    """The mass where it is, and others from where they are absent.
-
-    Its centre among these: fitted without them it may have taken the place of what a joint lacks.
-    """
-    mass, *centre = load.chosen
-    more = [*centre, *others]
-    return [mass, *more], np.concatenate((load.of(mass), absent(more)))

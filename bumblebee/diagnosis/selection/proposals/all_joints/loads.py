@@ -1,4 +1,4 @@
-"""Links of a large robot heavier or lighter than declared, asked by slopes beside the usual effects of all its joints.
+"""Links of a free base heavier or lighter than declared, asked by slopes beside the usual effects of all its joints.
 
 A load on the trunk makes every joint below it late and low. Offsets, rotors and gains of all joints share it out, and
 no single mass pays any more once these are taken for sure. So masses are asked before that: those that promise much

@@ -1,50 +1,69 @@
-"""Standard parameters by linear regression on inverse dynamics: where a fit of a robot that is told torques begins.
+"""Standard parameters by linear regression on inverse dynamics: where a fit of a robot on a fixed base begins.
 
 Far from the data a simulation of the declared model flies, and what holds it back wins: no strength at all, or friction
 beyond all measure. On the measured motion torques are linear in the standard parameters (Atkeson, An and Hollerbach
 1986), and one least-squares fit within bounds finds all of them. Every joint's friction and rotor are in it; others
 come in one after the other: loads and springs at the drives' declared strengths, or strengths and friction that goes
 with load at the links' declared masses. Both together have no scale: a drive of no strength on links of no mass
-explains every log. A drive's strength f is asked as what it takes of the torque that the motion asks, (1 - 1 / f) of
-it, and friction that goes with load by that torque too: as shares of the drive's own they would explain it away.
+explains every log. How late commands are is a profile: what all effects together leave, over the whole range. Noise in
+velocities makes rotors and friction look small and commands late, so a fit that begins at none is asked first.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.candidates import USUAL_OF_ROBOT, Candidate, absent, clipped, is_chosen
+from bumblebee.diagnosis.candidates import USUAL_OF_ROBOT, Candidate, absent, clipped, effects_at, is_chosen
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import Begun
+from bumblebee.diagnosis.selection.proposals.all_joints.regression import (
+    DAMPING,
+    SCALES,
+    STRENGTH,
+    Regressed,
+    Regression,
+    own_damping,
+)
 from bumblebee.diagnosis.sensitivities import LackingTorque, lacking_torque
 from bumblebee.sim.effects import CATALOGUE
 
-_STRENGTH = "motor_strength"
-_NOTHING = 1e-6
-"""Share of a joint's lacking torque that is nothing."""
+_GAIN = "kd"
+_GRID = 11
+"""Delays at which the profile begins."""
 
 
 def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level: float) -> list[Begun]:
     """Effects and values of regressions on the fitted windows, beside those of drives and beside those of links.
 
-    False alarms of what comes in one after the other are held to `level`. What else every robot has, a delay, begins
-    at none. None where no joint moves.
+    Each at no delay, and at the likeliest. False alarms of what comes in one after the other are held to `level`.
+    Without any drive nothing says how heavy the links are. Empty where no joint moves.
     """
     lacking, robot = lacking_torque(problem), [c for c in candidates if c.effect in USUAL_OF_ROBOT and not c.where]
-    every = ([c for c in candidates if CATALOGUE[c.effect].standard in ("joint", k)] for k in ("drive", "link"))
-    begun = (_beside(problem, some, lacking, level) for some in every if any(map(_is_first, some)))
-    return [([*chosen, *robot], np.concatenate((values, absent(robot)))) for chosen, values in begun]
+    gains, begun = {c.where: c for c in candidates if c.effect == _GAIN}, []
+    driven = bool((problem.plant.actuator >= 0).any())
+    for scale in ("drive", "link") if driven else ("drive",):
+        every = [c for c in candidates if CATALOGUE[c.effect].standard in ("joint", scale)]
+        if not any(map(_is_first, every)):
+            continue
+        regression = Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
+        for late in _delays(regression, every, lacking, robot):
+            fit = _chosen(regression.of(lacking.after(effects_at(robot, late))), problem, every, level)
+            effects, values = _as_values(lacking, [every[k] for k in fit.chosen], fit.sizes, gains)
+            begun.append(([*effects, *robot], np.concatenate((values, late))))
+    return [b for k, b in enumerate(begun) if not any(_same(b, other) for other in begun[:k])]
 
 
-def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque, level: float) -> Begun:
+def _same(one: Begun, other: Begun) -> bool:
+    """Whether the same effects are late alike: rows of drives and of links to which nothing came."""
+    return set(one[0]) == set(other[0]) and one[1][-1] == other[1][-1]
+
+
+def _chosen(regression: Regression, problem: Problem, every: Sequence[Candidate], level: float) -> Regressed:
     """The joints' effects, and of `every` those that come in beside them."""
-    regression = _Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
     least = problem.thresholds.comparison.validation.least_share
-    chosen = [k for k, c in enumerate(every) if _is_first(c)]
-    fit = regression.fit(chosen)
+    fit = regression.fit([k for k, c in enumerate(every) if _is_first(c)])
     for most in sorted({len(c.free) for c in every}):  # few numbers first: a mass before a centre of mass
         rest = [k for k, c in enumerate(every) if len(c.free) <= most and _is_open(c, every, fit)]
         while rest:
@@ -56,11 +75,36 @@ def _beside(problem: Problem, every: Sequence[Candidate], lacking: LackingTorque
             if larger.cost < (1 - least) * fit.cost:
                 fit = regression.fit(larger.chosen)
                 rest = [r for r in rest if _is_open(every[r], every, fit)]
-    return _as_values([every[k] for k in fit.chosen], fit.sizes)
+    return fit
 
 
-def _is_open(c: Candidate, every: Sequence[Candidate], fit: "_Fit") -> bool:
-    return not is_chosen(c, [every[k] for k in fit.chosen])
+def _delays(
+    regression: Regression, every: Sequence[Candidate], lacking: LackingTorque, robot: Sequence[Candidate]
+) -> list[np.ndarray]:
+    """None, and where what all effects leave is least over the whole range (1,), if that differs."""
+    if [c.effect for c in robot] != ["command_delay"]:
+        return [absent(robot)]
+    simple = [k for k, c in enumerate(every) if len(c.free) == 1]
+
+    def left(delay: float) -> float:
+        fit = regression.of(lacking.after(effects_at(robot, np.array([delay])))).fit(simple)
+        return float(np.log(fit.scale).sum())
+
+    low, high = (float(end[0]) for end in CATALOGUE["command_delay"].bounds(robot[0].nominal, robot[0].limits))
+    grid = np.linspace(low, high, _GRID)
+    k = int(np.argmin([left(delay) for delay in grid]))
+    ends = grid[max(k - 1, 0)], grid[min(k + 1, _GRID - 1)]
+    found = np.array(
+        [minimize_scalar(left, bounds=ends, method="bounded", options={"xatol": 0.1 * robot[0].step[0]}).x]
+    )
+    none = absent(robot)
+    return [none, found] if abs(found[0] - none[0]) > robot[0].step[0] else [none]
+
+
+def _is_open(c: Candidate, every: Sequence[Candidate], fit: Regressed) -> bool:
+    chosen = [every[k] for k in fit.chosen]
+    scaled = c.effect in SCALES and any(o.effect in SCALES and o.where == c.where for o in chosen)
+    return not scaled and not is_chosen(c, chosen)
 
 
 def _is_first(c: Candidate) -> bool:
@@ -68,92 +112,28 @@ def _is_first(c: Candidate) -> bool:
     return CATALOGUE[c.effect].standard == "joint" and CATALOGUE[c.effect].usual == "joint"
 
 
-def _as_values(effects: Sequence[Candidate], sizes: np.ndarray) -> Begun:
-    """Effects and values from sizes (P,) of their free parameters, those on a joint as its drive's strength says."""
-    ends = np.cumsum([len(c.free) for c in effects])
-    own = np.split(sizes, ends[:-1])
-    shares = {c.where: c.step[0] * size[0] for c, size in zip(effects, own, strict=True) if c.effect == _STRENGTH}
-    values = []
+def _as_values(
+    lacking: LackingTorque, effects: Sequence[Candidate], sizes: np.ndarray, gains: dict[str, Candidate]
+) -> Begun:
+    """Effects and values from sizes (P,) of their free parameters, those on a joint as its drive's scale says.
+
+    Damping below what is declared is a lower kd.
+    """
+    own = np.split(sizes, np.cumsum([len(c.free) for c in effects])[:-1])
+    scales = {
+        c.where: (c.effect, 1.0 / (1.0 - c.step[0] * size[0]))
+        for c, size in zip(effects, own, strict=True)
+        if c.effect in SCALES
+    }
+    chosen, values = [], []
     for c, size in zip(effects, own, strict=True):
-        strength, value = 1.0 / (1.0 - shares.get(c.where, 0.0)), absent([c])
-        value[list(c.free)] += strength * size * np.array(c.step)[list(c.free)]
+        kind, scale = scales.get(c.where, ("", 1.0))
+        value = absent([c])
+        value[list(c.free)] += scale * size * np.array(c.step)[list(c.free)]
+        less = value[0] - c.nominal[0]
+        if c.effect == DAMPING and less < 0 and own_damping(lacking, c.where) and c.where in gains:
+            kd = (scale if kind == STRENGTH else 1.0) * own_damping(lacking, c.where)
+            c, value = gains[c.where], np.array([1.0 + less / kd])
+        chosen.append(c)
         values.append(value)
-    return effects, clipped(effects, np.concatenate(values))
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Some of the candidates, by number."""
-
-    chosen: tuple[int, ...]
-    sizes: np.ndarray
-    """(P,) in their steps."""
-    left: np.ndarray
-    """(N, nv) torque that they leave [N m]."""
-    scale: np.ndarray
-    """(nv,) of it, by which it is weighed."""
-
-    @property
-    def cost(self) -> float:
-        return float(((self.left / self.scale) ** 2).sum())
-
-
-class _Regression:
-    """Least squares of the lacking torque on candidates' torques, within bounds."""
-
-    def __init__(self, lacking: LackingTorque, candidates: Sequence[Candidate], rounds: int) -> None:
-        self._rounds = rounds
-        self._lacking = lacking.torque.reshape(-1, lacking.torque.shape[-1])
-        self._torques = [
-            torque.reshape(len(torque), *self._lacking.shape) for torque in map(lacking.signatures.of, candidates)
-        ]
-        self._bounds = [_bounds(c) for c in candidates]
-        for k, c in enumerate(candidates):
-            if CATALOGUE[c.effect].standard == "drive":
-                own = self._torques[k]
-                asked = np.where(own, lacking.asked.reshape(self._lacking.shape), 0.0)
-                self._torques[k] = c.step[0] * (asked if c.effect == _STRENGTH else np.sign(own) * np.abs(asked))
-            if c.effect == _STRENGTH:
-                self._bounds[k] = np.sort((1 - 1 / (1 + c.step[0] * self._bounds[k])) / c.step[0], axis=0)
-
-    def fit(self, chosen: Sequence[int], scale: np.ndarray | None = None) -> _Fit:
-        """Fit some, by a scale or by that of what they leave."""
-        torques = np.concatenate([self._torques[k] for k in chosen])
-        low, high = np.concatenate([self._bounds[k] for k in chosen], axis=1)
-        given, scale = scale is not None, self._scale(self._lacking) if scale is None else scale
-        for _ in range(1 if given else self._rounds):
-            basis, triangle = np.linalg.qr((torques / scale).reshape(len(torques), -1).T)
-            sizes = lsq_linear(triangle, basis.T @ (self._lacking / scale).ravel(), (low, high)).x
-            left = self._lacking - np.tensordot(sizes, torques, axes=1)
-            fit = _Fit(tuple(chosen), sizes, left, scale)
-            scale = scale if given else self._scale(left)
-        return replace(fit, scale=scale)
-
-    def best(self, fit: _Fit, rest: Sequence[int]) -> tuple[int, float, float]:
-        """The one that would take most away beside a fit: which, how much of what is left as noise, which share."""
-        basis, _ = np.linalg.qr(self._flat(fit.chosen, fit.scale))
-        left = (fit.left / fit.scale).ravel()
-        left = left - basis @ (basis.T @ left)
-        total, gains = left @ left, []
-        for k in rest:
-            own = self._flat([k], fit.scale)
-            own = own - basis @ (basis.T @ own)
-            gains.append(left @ own @ np.linalg.lstsq(own, left)[0])
-        best = int(np.argmax(gains))
-        return rest[best], gains[best] * left.size / total, gains[best] / total
-
-    def _flat(self, chosen: Sequence[int], scale: np.ndarray) -> np.ndarray:
-        torques = np.concatenate([self._torques[k] for k in chosen])
-        return (torques / scale).reshape(len(torques), -1).T
-
-    def _scale(self, left: np.ndarray) -> np.ndarray:
-        """Median sizes (nv,) of what is left: friction at the turn of a motion is not linear."""
-        least = _NOTHING * np.median(np.abs(self._lacking), axis=0)
-        return np.maximum(np.median(np.abs(left), axis=0), np.maximum(least, 1e-300))
-
-
-def _bounds(c: Candidate) -> np.ndarray:
-    """Least and largest sizes (2, F) of a candidate's free parameters, in their steps."""
-    free = list(c.free)
-    ends = np.stack(CATALOGUE[c.effect].bounds(c.nominal, c.limits)) - absent([c])
-    return np.sort(ends[:, free] / np.array(c.step)[free], axis=0)
+    return chosen, clipped(chosen, np.concatenate(values))

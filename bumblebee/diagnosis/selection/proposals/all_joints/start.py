@@ -12,8 +12,7 @@ from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Expecting
 from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import (
     fit_all_joints,
-    is_small,
-    is_told_torques,
+    is_fixed,
     simulated,
     sure_among,
 )
@@ -53,9 +52,9 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
 def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]:
     """Fit the usual effects of all joints, see `fit_all_joints`; all of them may come at once.
 
-    Of a robot on a fixed base that is told torques its standard parameters, by inverse dynamics.
+    Of a robot on a fixed base its standard parameters, by inverse dynamics.
     """
-    if is_told_torques(run.problem):
+    if is_fixed(run.problem):
         begun = standard_parameters(run.problem, run.candidates, run.config.level)
         if not begun:
             return None
@@ -72,12 +71,12 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]
 
     Only if the last of these explained little, or they are very large: else the next may explain the rest. Where the
     windows were whitened far from here they are whitened anew first, and that may be all there is to it. If no effect
-    helps any more (`stuck`), large residuals of a small robot are enough, or very large ones.
+    helps any more (`stuck`), large residuals on a fixed base are enough, or very large ones.
     """
     power = run.power()
     enough = 1 if power >= run.rule.many_at_once else run.rule.many_after
     early = len(run.fit.chosen) < enough or (run.fall >= run.rule.many_little and power < run.config.far)
-    far = run.config.many if is_small(run.problem) else run.config.far
+    far = run.config.many if is_fixed(run.problem) else run.config.far
     if run.tried_many or run.given or power < run.config.many or (power < far if stuck else early):
         return False
     if run.power() < run.rule.whiten_anew * run.whitened_at:
@@ -100,14 +99,13 @@ def start_far_off(run: SearchState, tried: Sequence[Trial]) -> Asking[bool]:
     comes near. A search effect by effect converges to a wrong local minimum where every joint errs by factors.
     """
     rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
-    small = is_small(run.problem)
-    quick = small or is_told_torques(run.problem)
-    if run.asked_far or run.fit.chosen or declared < run.config.far or not (quick or _is_worth_minutes(run, tried)):
+    if run.asked_far or run.fit.chosen or declared < run.config.far:
+        return False
+    if not is_fixed(run.problem) and not _is_worth_minutes(run, tried):
         return False
     yield Asked(far=True)
     fit = yield from all_joints_of(run)
-    little = rule.next_to_nothing if small else rule.little_of_large
-    if fit is None or fit.power(run.problem) >= max(rule.still_off, little * declared):
+    if fit is None or fit.power(run.problem) >= max(rule.still_off, rule.little * declared):
         return False
     if not is_nearer(run, fit, tried):
         return False
@@ -125,7 +123,7 @@ def is_nearer(run: SearchState, fit: Fit, tried: Sequence[Trial]) -> bool:
 
 
 def _is_worth_minutes(run: SearchState, tried: Sequence[Trial]) -> bool:
-    """Whether all joints of a large robot may err: no effect of one place explains much, none of all leaves little."""
+    """Whether all joints of a free base may err: no effect of one place explains much, none of all leaves little."""
     place = (1 - run.rule.most_of_it) * run.fit.cost
     whole = run.problem.thresholds.selection.proposals.all_joints.nearer * run.fit.cost
     return all(t.cost > (place if t.candidate.where else whole) for t in tried)
@@ -134,6 +132,6 @@ def _is_worth_minutes(run: SearchState, tried: Sequence[Trial]) -> bool:
 def begun_with(run: SearchState, fit: Fit) -> Anew:
     """A beginning anew with many effects at once; standard parameters that are not sure there are taken out."""
     problem, holdout, fit = whitened_anew(run.problem, run.holdout, fit)
-    if is_told_torques(problem):
+    if is_fixed(problem):
         fit = sure_among(problem, fit) or fit
     return Anew(problem, holdout, fit, begun=True)

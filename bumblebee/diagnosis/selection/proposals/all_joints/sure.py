@@ -10,7 +10,7 @@ from bumblebee.diagnosis.residuals import Problem, by_misfit, window_weights
 def sure_of(problem: Problem, fit: Fit, known: Fit | None = None, simulated: bool = False) -> Fit | None:
     """The effects fitted on all windows, less those that are not sure there; `known` is a fit of these windows.
 
-    Whether each one's going is `simulated`: of a large robot's hundred effects too many go by slopes alone.
+    Whether each one's going is `simulated`: of a humanoid's hundred effects too many go by slopes alone.
     """
     for _ in range(problem.thresholds.selection.proposals.all_joints.rounds):
         if not fit.chosen:

@@ -1,7 +1,6 @@
-"""Masses that differ are told beside the usual effects of all joints of a large robot, before these share them out."""
+"""Masses that differ are told beside the usual effects of all joints of a free base, before these share them out."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import pytest
 
@@ -12,10 +11,9 @@ from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.levenberg_marquardt import levenberg_marquardt
 from bumblebee.diagnosis.residuals.problem import Problem, window_weights
 from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
-from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of_large, usual_effects
+from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of, usual_effects
 from bumblebee.diagnosis.selection.proposals.all_joints.loads import with_loads
 from tests.diagnosis import arm
-from tests.diagnosis.selection.begun import large_robots
 
 FRICTION = {("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (1.2, 2.0, 0.8), strict=True)}
 
@@ -23,12 +21,11 @@ FRICTION = {("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (1.2, 2.0, 0.
 def _problem(masses: dict[str, float]) -> tuple[Problem, list[Candidate]]:
     truth = {**FRICTION, **{("link_mass", body): mass for body, mass in masses.items()}}
     session = arm.session_of(arm.simulate(truth, count=3, seconds=5.0))
-    problem = replace(arm.problem_of(session, [0, 1], 40), thresholds=large_robots())
-    return problem, all_candidates(session.plant, session.rollouts, [])
+    return arm.problem_of(session, [0, 1], 40), all_candidates(session.plant, session.rollouts, [])
 
 
 def _joints(problem: Problem, candidates: Sequence[Candidate]) -> Fit:
-    first, *_ = sets_of_large(usual_effects(candidates), candidates)
+    first, *_ = sets_of(usual_effects(candidates), candidates)
     return levenberg_marquardt(problem, first, likely_values(problem, first), 9)
 
 

@@ -1,5 +1,6 @@
-"""A robot that logs torques, whose model has no friction and no rotors: by inverse dynamics, then simulated."""
+"""A robot on a fixed base, whose model has no friction and no rotors: by inverse dynamics, then simulated."""
 
+import re
 from dataclasses import replace
 
 import mujoco
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates import Candidate, all_candidates
+from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.quick import first_look, told
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
@@ -67,7 +69,15 @@ def rollouts(true: str, arrives: tuple[float, ...] = (1.0, 1.0, 1.0), count: int
 
 def regressed(logs: list[Rollout]) -> list[dict[tuple[str, str], np.ndarray]]:
     """Values by (effect, place) of both regressions, beside the drives' and beside the links'."""
-    session = arm.session_of(logs, xml())
+    return _regressed(arm.session_of(logs, xml()))
+
+
+def servos(truth: dict[tuple[str, str], float], true: str = arm.XML) -> list[dict[tuple[str, str], np.ndarray]]:
+    """The same of the arm that is told positions."""
+    return _regressed(arm.session_of(arm.simulate(truth, count=3, seconds=6.0, xml=true)))
+
+
+def _regressed(session: Session) -> list[dict[tuple[str, str], np.ndarray]]:
     problem = arm.problem_of(session, [0, 1, 2], 60)
     every = all_candidates(session.plant, session.rollouts, [])
     return [_by_place(*begun) for begun in standard_parameters(problem, every, 0.005)]
@@ -104,6 +114,47 @@ def test_a_drive_that_gives_less_is_told_from_no_drive_at_all() -> None:
 def test_a_load_is_told_at_the_declared_strengths() -> None:
     _, links = regressed(rollouts(xml(ROTORS, DRY, VISCOUS, hand=1.6)))
     assert links["link_mass", "l3"][0] == pytest.approx(1.6, rel=0.1)
+
+
+DRAWN = {("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (2.0, 3.0, 0.8), strict=True)}
+ROTORS_OF_SERVOS = {("armature", j): v for j, v in zip(arm.JOINTS, (0.4, 0.6, 0.15), strict=True)}
+
+
+@pytest.mark.parametrize("late", [0.0, 0.04])
+def test_servos_friction_rotors_and_delay_come_out_of_the_targets(late: float) -> None:
+    """Nothing comes in beside them; a delay is offered where there is one, and none is asked first."""
+    delay = {("command_delay", j): late for j in arm.JOINTS if late}
+    several = servos({**DRAWN, **ROTORS_OF_SERVOS, **delay})
+    assert several[0]["command_delay", ""] == [0.0]
+    found = next(f for f in several if f["command_delay", ""][0] == pytest.approx(late, abs=0.003))
+    for place, size in {**DRAWN, **ROTORS_OF_SERVOS}.items():
+        assert found[place][0] == pytest.approx(size, rel=0.06), place
+    assert {kind for kind, _ in found} == {"coulomb_friction", "viscous_friction", "armature", "command_delay"}
+
+
+def test_rows_of_drives_and_of_links_to_which_nothing_comes_are_one() -> None:
+    alone = [f for f in servos({**DRAWN, **ROTORS_OF_SERVOS}) if len(f) == 10 and f["command_delay", ""] == [0.0]]
+    assert len(alone) == 1
+
+
+def test_damping_below_the_servos_is_a_lower_kd_and_no_friction_below_none() -> None:
+    softer = re.sub(r'kv="(\d+)"', lambda m: f'kv="{int(m[1]) / 2}"', arm.XML)
+    for found in servos(DRAWN, softer):
+        assert [found["kd", j][0] for j in arm.JOINTS] == pytest.approx([0.5] * 3, abs=0.1)
+        assert not any(kind == "viscous_friction" for kind, _ in found)
+
+
+@pytest.mark.parametrize(("true", "damping"), [('kp="30" kv="4"', 4.0), ('kp="30" kv="2"', 2.0)])
+def test_a_servo_of_half_the_gain_is_told_with_its_whole_damping(true: str, damping: float) -> None:
+    """Half the strength and friction for its damping is half the kp: which of the two, a later step says."""
+    found, *_ = servos(DRAWN, arm.XML.replace('kp="60" kv="4"', true))
+    strength = found.get(("motor_strength", "j2"), np.ones(1))[0]
+    assert strength * found.get(("kp", "j2"), np.ones(1))[0] == pytest.approx(0.5, abs=0.03)
+    whole = (
+        4.0 * strength * found.get(("kd", "j2"), np.ones(1))[0] + found.get(("viscous_friction", "j2"), np.zeros(1))[0]
+    )
+    assert whole == pytest.approx(damping, abs=0.3)
+    assert found["coulomb_friction", "j2"][0] == pytest.approx(3.0, rel=0.1)
 
 
 def test_a_robot_a_radian_off_is_brought_to_the_noise() -> None:

@@ -2,7 +2,6 @@
 
 import pytest
 
-from bumblebee.diagnosis.selection.proposals.all_joints.link_load import link_load
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.steps import go
@@ -35,9 +34,3 @@ def test_a_load_is_one_mass_with_or_without_friction_on_all_joints(run: SearchSt
         assert found["coulomb_friction", joint] == pytest.approx(size, rel=0.15)
     assert not {"kp", "motor_strength"} & {effect for effect, _ in found}
     assert run.power() < 2.0
-
-
-@pytest.mark.parametrize("friction", [False, True])
-def test_there_is_no_load_on_a_robot_like_its_model_or_with_friction_alone(friction: bool) -> None:
-    run = begun({("coulomb_friction", j): v for j, v in FRICTION.items()} if friction else {})
-    assert link_load(run.problem, run.candidates) == ()
