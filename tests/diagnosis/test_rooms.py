@@ -42,7 +42,7 @@ NO_THRESHOLDS = {
     "plan/rehearsal.py": {"_BEFORE", "_TOGETHER"},  # rows of padding, memory
     "plan/written/drawing.py": {"_PANELS"},  # what fits a page
     "residuals/problem.py": {"_GROUP"},  # memory
-    "selection/proposals/all_joints/standard_parameters.py": {"_NOTHING"},  # rounding
+    "selection/proposals/all_joints/regression.py": {"_NOTHING"},  # rounding
     # halved and doubled they move nothing on the fixed sample: docs/decisions/threshold-day.md
     "dataset/smoothing.py": {"_NEIGHBOURS"},
     "dataset/split.py": {"_COMMANDED"},

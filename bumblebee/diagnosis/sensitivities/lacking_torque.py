@@ -27,7 +27,7 @@ class LackingTorque:
     """(W, S, nv) that the motion asks of the declared model's drives [N m]."""
 
     def after(self, effects: Sequence[Effect] = ()) -> np.ndarray:
-        """What is lacking (W, S, nv) [N m] by the commands as `effects` make them arrive."""
+        """Torque (W, S, nv) [N m] that is lacking by the commands as `effects` make them arrive."""
         plant, of = self.problem.plant, self.signatures
         control, _ = commanded(self.problem.windows, vary(plant, effects), of.path.step, len(of.path.edges) - 1)
         lacking = self.asked.copy()

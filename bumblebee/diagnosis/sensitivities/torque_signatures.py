@@ -131,9 +131,12 @@ class Signatures:
         """Generalised forces (W, S, nv) of rigid bodies alone: no contact, no friction, no servo."""
         if model is self.plant.model:
             if ("", 0) not in self._inverse:
-                self._inverse["", 0] = self.inverse_dynamics(copy.copy(self.plant.model))
+                self._inverse["", 0] = self._inverse_dynamics(self.plant.model)
             return self._inverse["", 0]
-        off = mujoco.mjtDisableBit
+        return self._inverse_dynamics(model)
+
+    def _inverse_dynamics(self, model: mujoco.MjModel) -> np.ndarray:
+        off, model = mujoco.mjtDisableBit, copy.copy(model)
         model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION) | int(off.mjDSBL_SPRING)
         model.opt.disableflags |= int(off.mjDSBL_SENSOR)
         data = mujoco.MjData(model)

@@ -15,6 +15,8 @@ class AllJoints:
     """Steps of that way with the links' effects, which begin from the joints'."""
     rounds: int = 3
     """Rounds of fitting on all windows and taking out what is not sure there; of weighing joints by what is left."""
+    delays: int = 11
+    """Delays over their whole range between which that of a robot on a fixed base is sought."""
     still_off: float = 2.0
     """Median chi-square that is much: above it the noise does not measure what is sure, and no search begins there."""
     off: float = 4.0

@@ -21,7 +21,6 @@ from bumblebee.diagnosis.selection.proposals.all_joints.begun import Begun
 from bumblebee.diagnosis.selection.proposals.all_joints.regression import (
     DAMPING,
     SCALES,
-    STRENGTH,
     Regressed,
     Regression,
     own_damping,
@@ -30,34 +29,32 @@ from bumblebee.diagnosis.sensitivities import LackingTorque, lacking_torque
 from bumblebee.sim.effects import CATALOGUE
 
 _GAIN = "kd"
-_GRID = 11
-"""Delays at which the profile begins."""
 
 
 def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level: float) -> list[Begun]:
-    """Effects and values of regressions on the fitted windows, beside those of drives and beside those of links.
+    """Effects and values of regressions on the fitted windows: every joint's alone, beside drives', beside links'.
 
     Each at no delay, and at the likeliest. False alarms of what comes in one after the other are held to `level`.
     Without any drive nothing says how heavy the links are. Empty where no joint moves.
     """
     lacking, robot = lacking_torque(problem), [c for c in candidates if c.effect in USUAL_OF_ROBOT and not c.where]
-    gains, begun = {c.where: c for c in candidates if c.effect == _GAIN}, []
+    begun: list[Begun] = []
     driven = bool((problem.plant.actuator >= 0).any())
-    for scale in ("drive", "link") if driven else ("drive",):
-        every = [c for c in candidates if CATALOGUE[c.effect].standard in ("joint", scale)]
-        if not any(map(_is_first, every)):
-            continue
+    first = [c for c in candidates if _is_first(c)]
+    several = [[c for c in candidates if CATALOGUE[c.effect].standard in ("joint", of)] for of in ("drive", "link")]
+    for every in [first, *several[: 1 + driven]] if first else ():
         regression = Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
         for late in _delays(regression, every, lacking, robot):
             fit = _chosen(regression.of(lacking.after(effects_at(robot, late))), problem, every, level)
-            effects, values = _as_values(lacking, [every[k] for k in fit.chosen], fit.sizes, gains)
+            effects, values = _as_values(lacking, [every[k] for k in fit.chosen], fit.sizes, candidates)
             begun.append(([*effects, *robot], np.concatenate((values, late))))
-    return [b for k, b in enumerate(begun) if not any(_same(b, other) for other in begun[:k])]
+    return [b for k, b in enumerate(begun) if not any(_same(b, other, robot) for other in begun[:k])]
 
 
-def _same(one: Begun, other: Begun) -> bool:
-    """Whether the same effects are late alike: rows of drives and of links to which nothing came."""
-    return set(one[0]) == set(other[0]) and one[1][-1] == other[1][-1]
+def _same(one: Begun, other: Begun, robot: Sequence[Candidate]) -> bool:
+    """Whether the same effects are late alike: nothing came to every joint's."""
+    late = all(abs(one[1][-1] - other[1][-1]) < c.step[0] for c in robot)
+    return set(one[0]) == set(other[0]) and late
 
 
 def _chosen(regression: Regression, problem: Problem, every: Sequence[Candidate], level: float) -> Regressed:
@@ -91,9 +88,9 @@ def _delays(
         return float(np.log(fit.scale).sum())
 
     low, high = (float(end[0]) for end in CATALOGUE["command_delay"].bounds(robot[0].nominal, robot[0].limits))
-    grid = np.linspace(low, high, _GRID)
+    grid = np.linspace(low, high, lacking.problem.thresholds.selection.proposals.all_joints.delays)
     k = int(np.argmin([left(delay) for delay in grid]))
-    ends = grid[max(k - 1, 0)], grid[min(k + 1, _GRID - 1)]
+    ends = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
     found = np.array(
         [minimize_scalar(left, bounds=ends, method="bounded", options={"xatol": 0.1 * robot[0].step[0]}).x]
     )
@@ -113,27 +110,40 @@ def _is_first(c: Candidate) -> bool:
 
 
 def _as_values(
-    lacking: LackingTorque, effects: Sequence[Candidate], sizes: np.ndarray, gains: dict[str, Candidate]
+    lacking: LackingTorque, effects: Sequence[Candidate], sizes: np.ndarray, candidates: Sequence[Candidate]
 ) -> Begun:
     """Effects and values from sizes (P,) of their free parameters, those on a joint as its drive's scale says.
 
-    Damping below what is declared is a lower kd.
+    Damping is told in its plainest form (`_plainest`).
     """
     own = np.split(sizes, np.cumsum([len(c.free) for c in effects])[:-1])
     scales = {
-        c.where: (c.effect, 1.0 / (1.0 - c.step[0] * size[0]))
-        for c, size in zip(effects, own, strict=True)
-        if c.effect in SCALES
+        c.where: 1.0 / (1.0 - c.step[0] * size[0]) for c, size in zip(effects, own, strict=True) if c.effect in SCALES
     }
-    chosen, values = [], []
+    found: dict[Candidate, np.ndarray] = {}
     for c, size in zip(effects, own, strict=True):
-        kind, scale = scales.get(c.where, ("", 1.0))
-        value = absent([c])
-        value[list(c.free)] += scale * size * np.array(c.step)[list(c.free)]
-        less = value[0] - c.nominal[0]
-        if c.effect == DAMPING and less < 0 and own_damping(lacking, c.where) and c.where in gains:
-            kd = (scale if kind == STRENGTH else 1.0) * own_damping(lacking, c.where)
-            c, value = gains[c.where], np.array([1.0 + less / kd])
-        chosen.append(c)
-        values.append(value)
-    return chosen, clipped(chosen, np.concatenate(values))
+        found[c] = absent([c])
+        found[c][list(c.free)] += scales.get(c.where, 1.0) * size * np.array(c.step)[list(c.free)]
+    there = {(c.effect, c.where): c for c in candidates}
+    for friction in [c for c in effects if c.effect == DAMPING]:
+        servo = [there[kind, friction.where] for kind in (*SCALES, _GAIN) if (kind, friction.where) in there]
+        if len(servo) == 3 and (declared := own_damping(lacking, friction.where)):
+            _plainest(found, friction, servo, declared)
+    return list(found), clipped(list(found), np.concatenate(list(found.values())))
+
+
+def _plainest(
+    found: dict[Candidate, np.ndarray], friction: Candidate, servo: Sequence[Candidate], declared: float
+) -> None:
+    """Tell a servo's scale as its strength or as its kp, whichever leaves less damping over; less than none as its kd.
+
+    Half the strength with friction for the damping that is lost are half the kp.
+    """
+    strength, proportional, gain = servo
+    scale = float(found.get(strength, found.get(proportional, np.ones(1)))[0])
+    whole = float(found.pop(friction)[0] - friction.nominal[0]) + declared * (scale if strength in found else 1.0)
+    drive, own = min(((strength, scale * declared), (proportional, declared)), key=lambda o: abs(whole - o[1]))
+    if found.pop(strength, None) is not None or found.pop(proportional, None) is not None:
+        found[drive] = np.array([scale])
+    more = whole - own
+    found[friction if more >= 0 else gain] = np.array([friction.nominal[0] + more if more >= 0 else 1.0 + more / own])

@@ -12,6 +12,7 @@ from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.quick import first_look, told
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
+from bumblebee.diagnosis.sensitivities import lacking_torque
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import CATALOGUE
 from tests.diagnosis import arm
@@ -68,12 +69,12 @@ def rollouts(true: str, arrives: tuple[float, ...] = (1.0, 1.0, 1.0), count: int
 
 
 def regressed(logs: list[Rollout]) -> list[dict[tuple[str, str], np.ndarray]]:
-    """Values by (effect, place) of both regressions, beside the drives' and beside the links'."""
+    """Values by (effect, place) of the regressions: every joint's alone, beside the drives', beside the links'."""
     return _regressed(arm.session_of(logs, xml()))
 
 
 def servos(truth: dict[tuple[str, str], float], true: str = arm.XML) -> list[dict[tuple[str, str], np.ndarray]]:
-    """The same of the arm that is told positions."""
+    """Those of the arm that is told positions."""
     return _regressed(arm.session_of(arm.simulate(truth, count=3, seconds=6.0, xml=true)))
 
 
@@ -94,7 +95,7 @@ TRUE = {(kind, joint): size for kind, sizes in
 
 
 def test_friction_rotors_and_a_coupled_motor_come_out_near_their_sizes() -> None:
-    for found in regressed(rollouts(xml(ROTORS, DRY, VISCOUS, COUPLED))):
+    for found in regressed(rollouts(xml(ROTORS, DRY, VISCOUS, COUPLED)))[1:]:
         for place, size in TRUE.items():
             assert found[place][0] == pytest.approx(size, rel=0.25), place
         assert found["coupled_friction", "j3"] == pytest.approx([0.5, 0.0, 1.0], abs=0.05)
@@ -104,7 +105,7 @@ def test_friction_rotors_and_a_coupled_motor_come_out_near_their_sizes() -> None
 
 
 def test_a_drive_that_gives_less_is_told_from_no_drive_at_all() -> None:
-    drives, links = regressed(rollouts(xml(ROTORS, DRY, VISCOUS), arrives=(1.0, 0.85, 1.0)))
+    _, drives, links = regressed(rollouts(xml(ROTORS, DRY, VISCOUS), arrives=(1.0, 0.85, 1.0)))
     assert drives["motor_strength", "j2"][0] == pytest.approx(0.85, abs=0.03)
     for place, size in TRUE.items():
         assert drives[place][0] == pytest.approx(size, rel=0.25), place
@@ -112,7 +113,7 @@ def test_a_drive_that_gives_less_is_told_from_no_drive_at_all() -> None:
 
 
 def test_a_load_is_told_at_the_declared_strengths() -> None:
-    _, links = regressed(rollouts(xml(ROTORS, DRY, VISCOUS, hand=1.6)))
+    *_, links = regressed(rollouts(xml(ROTORS, DRY, VISCOUS, hand=1.6)))
     assert links["link_mass", "l3"][0] == pytest.approx(1.6, rel=0.1)
 
 
@@ -128,11 +129,11 @@ def test_servos_friction_rotors_and_delay_come_out_of_the_targets(late: float) -
     assert several[0]["command_delay", ""] == [0.0]
     found = next(f for f in several if f["command_delay", ""][0] == pytest.approx(late, abs=0.003))
     for place, size in {**DRAWN, **ROTORS_OF_SERVOS}.items():
-        assert found[place][0] == pytest.approx(size, rel=0.06), place
+        assert found[place][0] == pytest.approx(size, rel=0.08), place
     assert {kind for kind, _ in found} == {"coulomb_friction", "viscous_friction", "armature", "command_delay"}
 
 
-def test_rows_of_drives_and_of_links_to_which_nothing_comes_are_one() -> None:
+def test_beginnings_to_which_nothing_comes_are_one() -> None:
     alone = [f for f in servos({**DRAWN, **ROTORS_OF_SERVOS}) if len(f) == 10 and f["command_delay", ""] == [0.0]]
     assert len(alone) == 1
 
@@ -144,17 +145,26 @@ def test_damping_below_the_servos_is_a_lower_kd_and_no_friction_below_none() -> 
         assert not any(kind == "viscous_friction" for kind, _ in found)
 
 
-@pytest.mark.parametrize(("true", "damping"), [('kp="30" kv="4"', 4.0), ('kp="30" kv="2"', 2.0)])
-def test_a_servo_of_half_the_gain_is_told_with_its_whole_damping(true: str, damping: float) -> None:
-    """Half the strength and friction for its damping is half the kp: which of the two, a later step says."""
-    found, *_ = servos(DRAWN, arm.XML.replace('kp="60" kv="4"', true))
-    strength = found.get(("motor_strength", "j2"), np.ones(1))[0]
-    assert strength * found.get(("kp", "j2"), np.ones(1))[0] == pytest.approx(0.5, abs=0.03)
-    whole = (
-        4.0 * strength * found.get(("kd", "j2"), np.ones(1))[0] + found.get(("viscous_friction", "j2"), np.zeros(1))[0]
-    )
-    assert whole == pytest.approx(damping, abs=0.3)
+@pytest.mark.parametrize(("effect", "true"), [("kp", 'kp="30" kv="4"'), ("motor_strength", 'kp="30" kv="2"')])
+def test_a_servo_of_half_the_kp_or_of_half_the_strength_is_told(effect: str, true: str) -> None:
+    """Half the strength and friction for its damping is half the kp: told is what leaves less damping over."""
+    several = servos(DRAWN, arm.XML.replace('kp="60" kv="4"', true))
+    found = next(f for f in several if (effect, "j2") in f)
+    assert found[effect, "j2"][0] == pytest.approx(0.5, abs=0.03)
+    assert len({("kp", "j2"), ("motor_strength", "j2")} & set(found)) == 1
     assert found["coulomb_friction", "j2"][0] == pytest.approx(3.0, rel=0.1)
+    assert found.get(("viscous_friction", "j2"), np.zeros(1))[0] < 0.3
+
+
+def test_every_conditions_model_stays_as_it_was() -> None:
+    """Inverse dynamics are asked of models without drives and constraints; those of the plant keep theirs."""
+    logs = [r for k, g in enumerate(((1.0, 1.0), (2.0, 3.0))) for r in arm.simulate(DRAWN, count=1, seed=k, gains=g)]
+    session = arm.session_of([replace(r, rollout_id=str(k)) for k, r in enumerate(logs)])
+    problem = arm.problem_of(session, [0, 1], 10)
+    before = [p.model.opt.disableflags for p in session.plant.every]
+
+    lacking_torque(problem)
+    assert len(before) == 2 and [p.model.opt.disableflags for p in session.plant.every] == before
 
 
 def test_a_robot_a_radian_off_is_brought_to_the_noise() -> None:
