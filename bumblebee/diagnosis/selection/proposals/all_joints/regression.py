@@ -11,8 +11,8 @@ from bumblebee.diagnosis.sensitivities import LackingTorque
 from bumblebee.sim.effects import CATALOGUE
 from bumblebee.sim.servo import servos_of
 
-STRENGTH, PROPORTIONAL, DAMPING = "motor_strength", "kp", "viscous_friction"
-SCALES = (STRENGTH, PROPORTIONAL)
+PROPORTIONAL, DAMPING = "kp", "viscous_friction"
+SCALES = ("motor_strength", PROPORTIONAL)
 """Effects that scale what a drive gives."""
 _NOTHING = 1e-6
 """Share of a joint's lacking torque that is nothing."""

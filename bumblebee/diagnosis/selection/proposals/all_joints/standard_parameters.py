@@ -5,8 +5,9 @@ beyond all measure. On the measured motion torques are linear in the standard pa
 1986), and one least-squares fit within bounds finds all of them. Every joint's friction and rotor are in it; others
 come in one after the other: loads and springs at the drives' declared strengths, or strengths and friction that goes
 with load at the links' declared masses. Both together have no scale: a drive of no strength on links of no mass
-explains every log. How late commands are is a profile: what all effects together leave, over the whole range. Noise in
-velocities makes rotors and friction look small and commands late, so a fit that begins at none is asked first.
+explains every log. What comes in must leave less by far in the simulator than every joint's alone. How late commands
+are is a profile: what all effects together leave, over the whole range. Noise in velocities makes rotors and friction
+look small and commands late, so a fit that begins at none is asked first.
 """
 
 from collections.abc import Sequence
