@@ -19,6 +19,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from benchmarks.from_a_drawing.arms import STIFF
 from benchmarks.undeclared.__main__ import commit, read_lines
 from bumblebee.diagnosis.dataset import open_session
 from bumblebee.diagnosis.diagnose import diagnose
@@ -41,7 +42,6 @@ _LINKS = (
     ("0 1 0", "0 0 .25", 2.2, ".01 .02 .04", ".006 .006 .004"),
     ("0 0 1", "0 0 .1", 0.9, ".02 .01 .05", ".0012 .0012 .0008"),
 )
-_SOLVER = 'solreffriction="0.004 1" solimpfriction=".999 .999 .001"'
 _INNER = 0.0005  # [s] step of the truth
 SECONDS, RUNS = 6, 8
 NEAR = 0.05
@@ -86,13 +86,13 @@ def model_of(armature: np.ndarray, dry: np.ndarray, viscous: np.ndarray, coupled
     """MJCF of the arm with motors; `coupled`: with a motor that turns with j5 and j6."""
     bodies = "".join(
         f'<body name="b{k + 1}" pos="{pos}"><joint name="{JOINTS[k]}" axis="{axis}" armature="{armature[k]}" '
-        f'frictionloss="{dry[k]}" damping="{viscous[k]}" {_SOLVER}/>'
+        f'frictionloss="{dry[k]}" damping="{viscous[k]}" {STIFF}/>'
         f'<inertial pos="{com}" mass="{mass}" diaginertia="{inertia}"/>'
         for k, (axis, pos, mass, com, inertia) in enumerate(_LINKS)
     )
     dry_, viscous_, armature_ = COUPLED.values()
     wrist = (
-        f'<tendon><fixed name="m6" frictionloss="{dry_}" damping="{viscous_}" armature="{armature_}" {_SOLVER}>'
+        f'<tendon><fixed name="m6" frictionloss="{dry_}" damping="{viscous_}" armature="{armature_}" {STIFF}>'
         '<joint joint="j5" coef="1"/><joint joint="j6" coef="1"/></fixed></tendon>'
     )
     motors = "".join(f'<motor name="{j}" joint="{j}" ctrlrange="-400 400"/>' for j in JOINTS)

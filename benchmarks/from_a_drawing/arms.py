@@ -18,7 +18,7 @@ from bumblebee.measured.rollout import Rollout, write_rollout
 
 _AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
 _TRUE_STEP = 5e-4
-_STIFF = 'solreffriction="0.004 1" solimpfriction=".999 .999 .001"'
+STIFF = 'solreffriction="0.004 1" solimpfriction=".999 .999 .001"'
 """Dry friction that holds: by MuJoCo's own softness a joint creeps under it."""
 
 
@@ -97,7 +97,7 @@ def xml(joints: Sequence[Joint], servo: bool, rotors: bool = False, gain: float 
     """MJCF of an arm; with `rotors` the true one: armature and friction, servos of `gain` times the gains, a load."""
     bodies, drives = "", ""
     for i, j in enumerate(joints):
-        own = f' armature="{j.armature}" frictionloss="{j.dry}" damping="{j.viscous}" {_STIFF}' if rotors else ""
+        own = f' armature="{j.armature}" frictionloss="{j.dry}" damping="{j.viscous}" {STIFF}' if rotors else ""
         mass = j.mass + (load if i == len(joints) - 1 else 0.0)
         place = 'pos="0 0 1"' if i == 0 else f'pos="0 0 {joints[i - 1].length}"'
         bodies += f'<body name="link{i}" {place}><joint name="joint{i}" axis="{j.axis}"{own}/>'

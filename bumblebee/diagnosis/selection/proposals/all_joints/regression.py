@@ -37,7 +37,7 @@ class Regressed:
 
 
 class Regression:
-    """Fits of some of the candidates to one lacking torque.
+    """Fits of some of the candidates to lacking torques (W, S, nv).
 
     A drive's strength f is asked as what it takes of the torque that the motion asks, (1 - 1 / f) of it, and friction
     that goes with load by that torque too: as shares of the drive's own they would explain it away. A servo's kp is
@@ -57,24 +57,21 @@ class Regression:
                 self._torques[k] = c.step[0] * np.where(own, of, 0.0)
             elif CATALOGUE[c.effect].standard == "drive":
                 self._torques[k] = c.step[0] * np.sign(own) * np.abs(np.where(own, asked, 0.0))
+        self._torques = [torques * self._moving for torques in self._torques]
 
-    def of(self, lacking: np.ndarray) -> "Regression":
-        """Fit this lacking torque (W, S, nv)."""
-        self._lacking = lacking.reshape(self._shape)
-        return self
-
-    def fit(self, chosen: Sequence[int], scale: np.ndarray | None = None) -> Regressed:
+    def fit(self, lacking: np.ndarray, chosen: Sequence[int], scale: np.ndarray | None = None) -> Regressed:
         """Fit some, by a scale or by that of what they leave."""
+        wanted = lacking.reshape(self._shape) * self._moving
+        least = _NOTHING * self._mean(wanted)
         torques = np.concatenate([self._torques[k] for k in chosen])
         low, high = np.concatenate([self._bounds[k] for k in chosen], axis=1)
-        given, scale = scale is not None, self._scale(self._lacking * self._moving) if scale is None else scale
+        given, scale = scale is not None, self._scale(wanted, least) if scale is None else scale
         for _ in range(1 if given else self._rounds):
-            weights = self._moving / scale
-            basis, triangle = np.linalg.qr((torques * weights).reshape(len(torques), -1).T)
-            sizes = lsq_linear(triangle, basis.T @ (self._lacking * weights).ravel(), (low, high)).x
-            left = (self._lacking - np.tensordot(sizes, torques, axes=1)) * self._moving
+            basis, triangle = np.linalg.qr((torques / scale).reshape(len(torques), -1).T)
+            sizes = lsq_linear(triangle, basis.T @ (wanted / scale).ravel(), (low, high), method="bvls").x
+            left = wanted - np.tensordot(sizes, torques, axes=1)
             fit = Regressed(tuple(chosen), sizes, left, scale)
-            scale = scale if given else self._scale(left)
+            scale = scale if given else self._scale(left, least)
         return replace(fit, scale=scale)
 
     def best(self, fit: Regressed, rest: Sequence[int]) -> tuple[int, float, float]:
@@ -95,13 +92,14 @@ class Regression:
 
     def _columns(self, chosen: Sequence[int], scale: np.ndarray) -> np.ndarray:
         torques = np.concatenate([self._torques[k] for k in chosen])
-        return (torques * (self._moving / scale)).reshape(len(torques), -1).T
+        return (torques / scale).reshape(len(torques), -1).T
 
-    def _scale(self, left: np.ndarray) -> np.ndarray:
-        """Mean sizes (nv,) of what is left where each joint moves."""
-        moving = np.maximum(self._moving.sum(axis=0), 1e-12)
-        least = _NOTHING * np.abs(self._lacking * self._moving).sum(axis=0) / moving
-        return np.maximum(np.abs(left).sum(axis=0) / moving, np.maximum(least, 1e-300))
+    def _scale(self, left: np.ndarray, least: np.ndarray) -> np.ndarray:
+        return np.maximum(self._mean(left), np.maximum(least, 1e-300))
+
+    def _mean(self, left: np.ndarray) -> np.ndarray:
+        """Mean sizes (nv,) where each joint moves."""
+        return np.abs(left).sum(axis=0) / np.maximum(self._moving.sum(axis=0), 1e-12)
 
 
 def own_damping(lacking: LackingTorque, joint: str) -> float:

@@ -39,14 +39,14 @@ def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level
     Without any drive nothing says how heavy the links are. Empty where no joint moves.
     """
     lacking, robot = lacking_torque(problem), [c for c in candidates if c.effect in USUAL_OF_ROBOT and not c.where]
-    begun: list[Begun] = []
-    driven = bool((problem.plant.actuator >= 0).any())
-    first = [c for c in candidates if _is_first(c)]
-    several = [[c for c in candidates if CATALOGUE[c.effect].standard in ("joint", of)] for of in ("drive", "link")]
-    for every in [first, *several[: 1 + driven]] if first else ():
-        regression = Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
-        for late in _delays(regression, every, lacking, robot):
-            fit = _chosen(regression.of(lacking.after(effects_at(robot, late))), problem, every, level)
+    every = [c for c in candidates if CATALOGUE[c.effect].standard]
+    regression = Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
+    several, begun = [[k for k, c in enumerate(every) if _is_first(c)]], []
+    for scale in ("drive", "link") if (problem.plant.actuator >= 0).any() else ("drive",):
+        several.append([k for k, c in enumerate(every) if CATALOGUE[c.effect].standard in ("joint", scale)])
+    for among in several if several[0] else ():
+        for late in _delays(regression, [k for k in among if len(every[k].free) == 1], lacking, robot):
+            fit = _chosen(regression, lacking.after(effects_at(robot, late)), every, among, problem, level)
             effects, values = _as_values(lacking, [every[k] for k in fit.chosen], fit.sizes, candidates)
             begun.append(([*effects, *robot], np.concatenate((values, late))))
     return [b for k, b in enumerate(begun) if not any(_same(b, other, robot) for other in begun[:k])]
@@ -58,34 +58,40 @@ def _same(one: Begun, other: Begun, robot: Sequence[Candidate]) -> bool:
     return set(one[0]) == set(other[0]) and late
 
 
-def _chosen(regression: Regression, problem: Problem, every: Sequence[Candidate], level: float) -> Regressed:
-    """The joints' effects, and of `every` those that come in beside them."""
+def _chosen(
+    regression: Regression,
+    lacking: np.ndarray,
+    every: Sequence[Candidate],
+    among: Sequence[int],
+    problem: Problem,
+    level: float,
+) -> Regressed:
+    """Every joint's effects, and of those `among` all of `every` those that come in beside them."""
     least = problem.thresholds.comparison.validation.least_share
-    fit = regression.fit([k for k, c in enumerate(every) if _is_first(c)])
-    for most in sorted({len(c.free) for c in every}):  # few numbers first: a mass before a centre of mass
-        rest = [k for k, c in enumerate(every) if len(c.free) <= most and _is_open(c, every, fit)]
+    fit = regression.fit(lacking, [k for k in among if _is_first(every[k])])
+    for most in sorted({len(every[k].free) for k in among}):  # few numbers first: a mass before a centre of mass
+        rest = [k for k in among if len(every[k].free) <= most and _is_open(every[k], every, fit)]
         while rest:
             k, gain, share = regression.best(fit, rest)
-            if share < least or gain < chi2.isf(level / len(every), len(every[k].free)):
+            if share < least or gain < chi2.isf(level / len(among), len(every[k].free)):
                 break
-            larger = regression.fit([*fit.chosen, k], fit.scale)
+            larger = regression.fit(lacking, [*fit.chosen, k], fit.scale)
             rest.remove(k)
             if larger.cost < (1 - least) * fit.cost:
-                fit = regression.fit(larger.chosen)
+                fit = regression.fit(lacking, larger.chosen)
                 rest = [r for r in rest if _is_open(every[r], every, fit)]
     return fit
 
 
 def _delays(
-    regression: Regression, every: Sequence[Candidate], lacking: LackingTorque, robot: Sequence[Candidate]
+    regression: Regression, among: Sequence[int], lacking: LackingTorque, robot: Sequence[Candidate]
 ) -> list[np.ndarray]:
-    """None, and where what all effects leave is least over the whole range (1,), if that differs."""
+    """None, and where what effects leave together is least over the whole range (1,), if that differs."""
     if [c.effect for c in robot] != ["command_delay"]:
         return [absent(robot)]
-    simple = [k for k, c in enumerate(every) if len(c.free) == 1]
 
     def left(delay: float) -> float:
-        fit = regression.of(lacking.after(effects_at(robot, np.array([delay])))).fit(simple)
+        fit = regression.fit(lacking.after(effects_at(robot, np.array([delay]))), among)
         return float(np.log(fit.scale).sum())
 
     low, high = (float(end[0]) for end in CATALOGUE["command_delay"].bounds(robot[0].nominal, robot[0].limits))
