@@ -24,9 +24,9 @@ class SearchConfig:
     patience: int = 4
     """Rounds that may fail, one after the other, before the search ends."""
     far: float = 30.0
-    """Median chi-square above which gains far from the declared ones are tried first."""
+    """Median chi-square above which the standard parameters of all joints are fitted before anything is found."""
     many: float = 4.0
-    """Median chi-square above which, after two effects, the usual ones of all joints are fitted.
+    """Median chi-square above which, after two effects, the standard parameters of all joints are fitted.
 
     If the last explained little, or the chi-square is above `far`.
     """

@@ -33,7 +33,7 @@ class Servos:
     """(..., 1) supply voltage as a share of that at which a speed leaves no torque."""
 
     def torque(
-        self, position: np.ndarray, velocity: np.ndarray, control: np.ndarray, limit: np.ndarray | None = None
+        self, position: np.ndarray, velocity: np.ndarray, control: np.ndarray, limit: np.ndarray | float | None = None
     ) -> np.ndarray:
         """Torque (..., J) [N m] at positions, velocities and controls (..., J) of the servos."""
         bias = self.bias

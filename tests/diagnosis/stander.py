@@ -19,11 +19,11 @@ NOISE = {"q": 5e-4, "v": 0.02, "quat": 0.002, "gyro": 0.01, "odometry": 0.02, "p
 
 
 def simulate(
-    mass: float = 1.5, count: int = 2, seconds: float = 4.0, seed: int = 0
+    mass: float = 1.5, count: int = 2, seconds: float = 4.0, seed: int = 0, xml: str = XML
 ) -> tuple[list[Rollout], np.ndarray]:
     """Rollouts at 50 Hz of the stander whose arm weighs `mass` [kg], and the true heights (count, T) [m]."""
     rng = np.random.default_rng(seed)
-    model = mujoco.MjModel.from_xml_string(XML)
+    model = mujoco.MjModel.from_xml_string(xml)
     model.opt.timestep, model.opt.integrator = 0.001, int(mujoco.mjtIntegrator.mjINT_EULER)
     model.body_mass[model.body("arm").id] = mass
     mujoco.mj_setConst(model, mujoco.MjData(model))

@@ -49,14 +49,14 @@ def test_an_effect_in_one_place_is_one_lead() -> None:
 
 
 def test_gains_that_are_wrong_on_all_joints_are_the_leads() -> None:
-    """The firmware multiplies what it is told by four; no single effect passes for that. Sizes are the grid's steps."""
+    """The firmware multiplies what it is told by four; no single effect passes for that."""
     look = first_look(arm.session_of(arm.simulate({("motor_strength", j): 4.0 for j in arm.JOINTS}, seed=3)), CONFIG)
     found = {(lead.candidate.effect, lead.candidate.where): lead.values[0] for lead in look.leads.together}
     for name in arm.JOINTS:
         strength = found.get(("motor_strength", name), 1.0)
         assert strength * found.get(("kp", name), 1.0) == pytest.approx(4.0, rel=0.25)
     assert look.leads.together[0].explains > 0.9 and look.leads.alone == []
-    assert "drives far from the declared ones" in told(look, WHOLE) and "no effect" not in told(look, WHOLE)
+    assert "standard parameters by inverse dynamics" in told(look, WHOLE) and "no effect" not in told(look, WHOLE)
 
 
 def test_no_lead_is_on_a_joint_whose_residual_shows_nothing(look: FirstLook) -> None:

@@ -54,7 +54,6 @@ NO_THRESHOLDS = {
     },
     "report/effect_entries.py": {"_COMPARABLE"},
     "residuals/nuisances.py": {"_LEAST_ARMATURE"},
-    "selection/proposals/gain_grid.py": {"_LEAST_FACTOR"},
     "estimation/covariance.py": {"_TOLD"},
     "simulation/actuators.py": {"_FEEDBACK"},
     "simulation/collision_culling.py": {"_LEVEL"},

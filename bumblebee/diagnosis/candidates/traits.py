@@ -12,7 +12,7 @@ def _which(trait: str, *values: object) -> tuple[str, ...]:
 INVERSE, ABRUPT, JUDGED_ALONE, SATURATIONS, SHAPED = (
     _which(trait, True) for trait in ("inverse", "abrupt", "judged_alone", "saturation", "on_dry_friction")
 )
-USUAL, USUAL_OF_ROBOT, USUAL_OF_BODIES = (_which("usual", of) for of in ("joint", "robot", "body"))
+USUAL_OF_ROBOT, USUAL_OF_BODIES = (_which("usual", of) for of in ("robot", "body"))
 (IMU_TILT,) = _which("base", True)
 
 

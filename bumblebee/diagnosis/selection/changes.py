@@ -80,15 +80,6 @@ class Renamed:
 
 
 @dataclass(frozen=True, eq=False)
-class FarOff:
-    """Servos far from the declared ones, to begin with."""
-
-    fit: Fit
-    z: np.ndarray
-    """(E,) of each effect."""
-
-
-@dataclass(frozen=True, eq=False)
 class Anew:
     """Anew that were whitened around a fit, to begin anew with; `begun`: with many effects at once."""
 
@@ -130,7 +121,7 @@ class Expecting:
     effects: int
 
 
-Change = Expecting | Offered | Taken | Refitted | Renamed | FarOff | Anew | Lost | Vain | Asked
+Change = Expecting | Offered | Taken | Refitted | Renamed | Anew | Lost | Vain | Asked
 T = TypeVar("T")
 Asking = Generator[Change, bool, T]
 """A step that returns a T."""

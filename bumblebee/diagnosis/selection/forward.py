@@ -19,7 +19,6 @@ from bumblebee.diagnosis.selection.changes import Asking, Loss
 from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
 from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
-from bumblebee.diagnosis.selection.proposals.gain_grid import start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
 from bumblebee.diagnosis.selection.proposals.leaning_sensor import whiten_where_it_leans
 from bumblebee.diagnosis.selection.proposals.packet_loss import find_packet_loss
@@ -120,11 +119,9 @@ def begin(
     say: Callable[[str], None],
     budget: Budget,
 ) -> SearchState:
-    """A search at its beginning: with servos far from the declared ones if need be, and all candidates screened."""
+    """A search at its beginning: all candidates screened."""
     run = SearchState(problem, holdout, remake, config, say)
     budget.found = lambda: max(len(run.fit.chosen), run.expected)
-    name, far = "gains far from the declared ones", partial(go, run, start_with_gain_grid)
-    _in_time(run, budget, name, partial(problem.plant.failures.attempt, name, far, _no))
     run.open()
     return run
 
@@ -141,7 +138,7 @@ def _in_time(run: SearchState, budget: Budget, what: str, take: Callable[[], obj
 
 
 def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
-    """Forward selection, and once more from the usual effects of all joints where it stays far from the data.
+    """Forward selection, and once more from the standard parameters of all joints where it stays far from the data.
 
     Where all servos damp too little, no single one of them brings the robot nearer.
     """

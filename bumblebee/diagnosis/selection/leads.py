@@ -12,7 +12,6 @@ from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.moves import Terms, refitted
 from bumblebee.diagnosis.selection.proposals.all_joints import all_joints_of, is_fixed, is_nearer
-from bumblebee.diagnosis.selection.proposals.gain_grid import far_gains
 from bumblebee.diagnosis.selection.rounds import SINGLE, Kept, Round, ask
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.steps import go
@@ -59,9 +58,6 @@ def leads(
     candidate whose trial costs least, however many of its parameters are tested together.
     """
     run, attempt = SearchState(problem, holdout, remake, config, say), problem.plant.failures.attempt
-    gains = attempt("gains far from the declared ones", lambda: far_gains(run), lambda: None)
-    if gains is not None:
-        return Leads(_together(run, gains), [], "drives far from the declared ones (sizes to the steps of a grid)")
 
     def shown(effects: Sequence[Effect]) -> tuple[list[Candidate], np.ndarray]:
         candidates, typical = remake(effects)

@@ -21,7 +21,7 @@ from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.steps import go
 from bumblebee.diagnosis.selection.trial import Trial
 
-ALL_JOINTS = "the usual effects of all joints"
+ALL_JOINTS = "standard parameters of all joints"
 
 
 @dataclass(eq=False)
@@ -127,10 +127,10 @@ SINGLE = (
 """Single effects, drives far from the declared ones first."""
 PROPOSALS = (
     *SINGLE,
+    Proposal("drives that follow their targets late", _late),
     Proposal(ALL_JOINTS, _far_off),
     Proposal(ALL_JOINTS, _all_joints, when=lambda now: not now.explains_much),
     Proposal("contact with a surface", _contacts, once=lambda now: now.run.fit),
-    Proposal("drives that follow their targets late", _late),
     Proposal("torque ripple", _ripple),
     Proposal("limits of drives", _limits, once=lambda now: (now.run.fit, now.where_limits_matter)),
     Proposal("backlash", _backlash, when=lambda now: not now.tried),

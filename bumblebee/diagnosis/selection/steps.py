@@ -11,7 +11,6 @@ from bumblebee.diagnosis.selection.changes import (
     Asking,
     Change,
     Expecting,
-    FarOff,
     Lost,
     Offered,
     Refitted,
@@ -54,8 +53,6 @@ def _made(run: SearchState, change: Change) -> bool:
                 run.prune()
         case Renamed():
             _rename(run, change)
-        case FarOff():
-            _begin_far_off(run, change)
         case Anew():
             _begin_anew(run, change)
         case Lost():
@@ -79,16 +76,6 @@ def _rename(run: SearchState, change: Renamed) -> None:
         if c not in {s.candidate for s in run.steps}:
             z = wald(run.problem, run.fit, run.weights, i)
             run.steps.append(evidence(c, z, len(run.candidates)))
-
-
-def _begin_far_off(run: SearchState, change: FarOff) -> None:
-    fit = change.fit
-    for c, z in zip(fit.chosen, change.z, strict=True):
-        run.steps.append(evidence(c, float(z), len(run.candidates)))
-        run.say(f"found {c.effect} on {c.where}, far from the declared value: {fit.of(c).round(5)}")
-    run.screened_cost = 0.0
-    run.renew(fit)
-    run.given = len(fit.chosen)
 
 
 def _begin_anew(run: SearchState, change: Anew) -> None:

@@ -1,6 +1,7 @@
 """Sensitivities: the change of the residuals by a small change of each candidate."""
 
 from bumblebee.diagnosis.sensitivities.columns import Answered, Columns, pulse_sizes, screen
+from bumblebee.diagnosis.sensitivities.ground import basis_of, without
 from bumblebee.diagnosis.sensitivities.impulse_responses import Answers, Path, answers_of
 from bumblebee.diagnosis.sensitivities.lacking_torque import LackingTorque, lacking_torque
 
@@ -11,7 +12,9 @@ __all__ = [
     "LackingTorque",
     "Path",
     "answers_of",
+    "basis_of",
     "lacking_torque",
     "pulse_sizes",
     "screen",
+    "without",
 ]

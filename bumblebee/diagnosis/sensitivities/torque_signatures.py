@@ -85,7 +85,7 @@ class Signatures:
         """Jacobian (W, S, 3, nv) of a body's centre of mass."""
         model, data = self.plant.model, mujoco.MjData(self.plant.model)
         index = model.body(body).id
-        q = self._middles()[0]
+        q = self.middles()[0]
         flat = q.reshape(-1, q.shape[-1])
         rows = np.empty((len(flat), 3, model.nv))
         linear, angular = np.empty((3, model.nv)), np.empty((3, model.nv))
@@ -120,7 +120,7 @@ class Signatures:
             self._inverse[key] = self.servos.controls(control)
         return self._inverse[key]
 
-    def _middles(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def middles(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """State and acceleration (W, S, .) of whole segments: middle position, mean velocity and acceleration."""
         edges, path = self.path.edges, self.path
         acceleration = np.diff(path.qvel[:, edges], axis=1) / (path.step * np.diff(edges))[:, None]
@@ -140,7 +140,7 @@ class Signatures:
         model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION) | int(off.mjDSBL_SPRING)
         model.opt.disableflags |= int(off.mjDSBL_SENSOR)
         data = mujoco.MjData(model)
-        q, v, a = (x.reshape(-1, x.shape[-1]) for x in self._middles())
+        q, v, a = (x.reshape(-1, x.shape[-1]) for x in self.middles())
         out = np.empty_like(v)
         for k in range(len(q)):
             data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]

@@ -50,7 +50,7 @@ from bumblebee.diagnosis.simulation.units import (
     unit_on,
 )
 from bumblebee.diagnosis.simulation.variation import Variation, vary, vary_or_refuse
-from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, command_inputs, cut, select
+from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, command_inputs, cut, select, start_state
 
 __all__ = [
     "KINDS",
@@ -111,6 +111,7 @@ __all__ = [
     "simulated_readings",
     "smallest_moves",
     "spot",
+    "start_state",
     "state_before",
     "unit_on",
     "vary",

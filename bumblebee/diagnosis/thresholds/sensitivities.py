@@ -26,8 +26,17 @@ class TorqueSignatures:
 
 
 @dataclass(frozen=True)
+class Ground:
+    """Settings of where the ground may push a robot."""
+
+    touching: float = 0.02
+    """Distance [m] below which a body may touch: about what base and joints are misread by."""
+
+
+@dataclass(frozen=True)
 class SensitivityThresholds:
     """All of them."""
 
     impulses: Impulses = field(default_factory=Impulses)
     signatures: TorqueSignatures = field(default_factory=TorqueSignatures)
+    ground: Ground = field(default_factory=Ground)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from bumblebee.diagnosis.thresholds.proposals.drives import (
     DeclaredScale,
     DriveGrid,
-    GainGrid,
     GainParameters,
     Saturation,
     SetPoints,
@@ -27,7 +26,6 @@ __all__ = [
     "DriveGrid",
     "EncoderResolution",
     "FrictionFamily",
-    "GainGrid",
     "GainParameters",
     "HysteresisLaw",
     "JointElasticity",
@@ -51,7 +49,6 @@ class ProposalThresholds:
     surface_contact: SurfaceContact = field(default_factory=SurfaceContact)
     joint_elasticity: JointElasticity = field(default_factory=JointElasticity)
     setpoints: SetPoints = field(default_factory=SetPoints)
-    gain_grid: GainGrid = field(default_factory=GainGrid)
     drive_grid: DriveGrid = field(default_factory=DriveGrid)
     all_joints: AllJoints = field(default_factory=AllJoints)
     packet_loss: PacketLoss = field(default_factory=PacketLoss)

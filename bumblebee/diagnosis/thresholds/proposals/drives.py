@@ -58,50 +58,6 @@ class SetPoints:
 
 
 @dataclass(frozen=True)
-class GainGrid:
-    """Thresholds for servo gains that are far from the declared ones, and dry friction with them."""
-
-    shared: tuple[float, ...] = (1.0, 0.3, 0.1, 0.03, 0.01, 3.0)
-    """Factors on kp and on kd of all servos at once, each with each."""
-    sweeps: tuple[tuple[float, ...], ...] = (
-        (0.3, 0.6, 1.6, 3.0),
-        (0.3, 0.6, 1.6, 3.0),
-        (0.5, 0.8, 1.25, 2.0),
-        (0.7, 0.9, 1.1, 1.4),
-        (0.85, 1.15),
-    )
-    """Factors on the values of each servo, sweep by sweep."""
-    dry_shares: tuple[float, ...] = (0.01, 0.03, 0.1)
-    """Dry friction tried first, as shares of the servo's torque limit."""
-    most_dry: float = 0.5
-    """Dry friction at most, as a share of the servo's torque limit."""
-    span: float = 1.0
-    """[s] length of windows: in a short one gain, damping and friction can stand for each other."""
-    windows: int = 36
-    """Windows of that length."""
-    noise_factor: float = 3.0
-    """On the noise, below which errors hardly count."""
-    diverged: float = 10.0
-    """[rad] error of a simulation that diverged."""
-    unlike: float = 0.02
-    """Score of a gain that is e times the others', which matters where a servo's own data say next to nothing."""
-    least_fall: float = 0.1
-    """Fall of the mean score from which on the servos are taken for far off."""
-    wrong_factor: float = 2.0
-    """Factor by which a kp is wrong that counts as far off."""
-    wrong_servos: float = 0.5
-    """Share of servos that must be: else one effect may have carried the residuals away."""
-    decided_after: int = 2
-    """Sweeps after which too few servos that are nearly so wrong end the search."""
-    nearly_wrong: float = 1.5
-    """Factor on kp that counts as nearly wrong then."""
-    nearly: float = 0.5
-    """Share of `wrong_servos` that must be nearly wrong then."""
-    step: float = 0.1
-    """Share of a value that matters: at a hundredth of the declared gain a tenth of that is no small change."""
-
-
-@dataclass(frozen=True)
 class DriveGrid:
     """Factors on one drive's strength, gain or torque limit, tried in a large-residual regime."""
 

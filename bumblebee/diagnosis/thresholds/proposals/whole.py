@@ -5,18 +5,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class AllJoints:
-    """Thresholds for the usual effects of all joints, fitted together."""
+    """Thresholds for the standard parameters of all joints, fitted together."""
 
     windows: int = 60
     """Number of windows used for the coarse fit."""
     steps: int = 9
     """Steps of Levenberg's and Marquardt's way at most."""
     steps_with_links: int = 5
-    """Steps of that way with the links' effects, which begin from the joints'."""
+    """Steps of that way with links' masses or fewer dampings, which begin from all joints' effects."""
     rounds: int = 3
     """Rounds of fitting on all windows and taking out what is not sure there; of weighing joints by what is left."""
     delays: int = 11
-    """Delays over their whole range between which that of a robot on a fixed base is sought."""
+    """Delays over their whole range between which that of the robot is sought."""
     still_off: float = 2.0
     """Median chi-square that is much: above it the noise does not measure what is sure, and no search begins there."""
     off: float = 4.0
@@ -28,18 +28,13 @@ class AllJoints:
     """Masses asked together at most: a trunk, hands and a head."""
     little: float = 0.05
     """Share of the declared model's median chi-square that all joints' effects leave less of where they come first."""
-    enough: float = 0.05
-    """Share of the median chi-square above which strengths and kp are asked on a free base, too."""
-    likely_dry: float = 0.01
-    """Share of a drive's limit at which dry friction begins on a free base; the robots of
-    `benchmarks.from_a_drawing` have .5 to 5 %."""
     holding: tuple[float, ...] = (0.005, 0.01, 0.02, 0.04)
     """Shares of a drive's limit that dry friction is tried at where twice the servo's damping or more holds a joint."""
     nearer: float = 0.3
     """Share of the cost that the best effect by itself leaves, which all joints' must leave less of; share of the
     declared model's below which an effect of the whole robot comes first on a free base."""
     one_damping: float = 0.05
-    """Share by which the cost may grow where kd and a joint's viscous friction become one."""
+    """Share by which the cost may grow where dry friction alone holds a joint."""
 
 
 @dataclass(frozen=True)

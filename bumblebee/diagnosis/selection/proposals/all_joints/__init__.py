@@ -3,19 +3,16 @@
 A robot with friction and latency on every joint is found one effect at a time only by a long way round: each effect
 alone explains a twentieth, and what stands for the others' share has a strange name. Where residuals are large still
 after two effects (after one, where they are hundreds of times the noise), and the last explained little or they are
-very large, all joints are fitted together; on a robot far from the data, or in the place of gains far from the declared
-ones (`gain_grid`), before anything else.
+very large, all joints are fitted together; on a robot far from the data before anything else.
 
-On a fixed base a regression on inverse dynamics says where to begin (`standard_parameters`). On a free base the ground
-pushes back, and the usual effects are fitted from the declared values on, or from those found: rotors and friction from
-likely sizes where the model, made from a drawing, has none (`begun`), strengths and gains only where much is left,
-for a servo's strength, its joint's inertia and its friction go by one common factor nearly as a torque drive's do
-(`declared_scale`); masses of links come in by slopes (`loads`), and a joint that hardly moves is held by dry friction,
-not by damping (`held_joints`). What is not sure is taken out again, and the rest has to pay on windows that took no
-part; these and the fitted ones are then whitened anew, and the search goes on from there.
+A regression on inverse dynamics says where to begin (`standard_parameters`). Where the base is free the ground pushes
+back, and whatever torque it can make is unknown (`sensitivities.ground`): legs that share the weight say little, and
+the simulator says the rest. There masses of links come in by slopes (`loads`), and a joint that hardly moves is held by
+dry friction, not by damping (`held_joints`). What is not sure is taken out again, and the rest has to pay on windows
+that took no part; these and the fitted ones are then whitened anew, and the search goes on from there.
 """
 
-from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_fixed
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import is_fixed
 from bumblebee.diagnosis.selection.proposals.all_joints.start import (
     all_joints_of,
     begun_with,
@@ -28,7 +25,6 @@ from bumblebee.diagnosis.selection.proposals.all_joints.start import (
 __all__ = [
     "all_joints_of",
     "begun_with",
-    "fit_all_joints",
     "is_fixed",
     "is_nearer",
     "start_far_off",

@@ -1,4 +1,4 @@
-"""Links of a free base heavier or lighter than declared, asked by slopes beside the usual effects of all its joints.
+"""Links of a free base heavier or lighter than declared, asked by slopes beside the standard parameters of its joints.
 
 A load on the trunk makes every joint below it late and low. Offsets, rotors and gains of all joints share it out, and
 no single mass pays any more once these are taken for sure. So masses are asked before that: those that promise much
@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate, is_chosen
+from bumblebee.diagnosis.candidates import Candidate, absent, is_chosen
 from bumblebee.diagnosis.estimation import Fit, cost_of, levenberg_marquardt
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection.proposals.all_joints.begun import beside, is_whole
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.sensitivities import Columns
 
@@ -26,7 +25,8 @@ def with_loads(problem: Problem, fit: Fit, candidates: Sequence[Candidate]) -> F
     loads = _promising(problem, fit, candidates, weights, rule.load_takes * cost)
     if not loads:
         return fit
-    loaded = levenberg_marquardt(problem, *beside(fit, loads), rule.steps_with_links)
+    begun = (*fit.chosen, *loads), np.concatenate((fit.values, absent(loads)))
+    loaded = levenberg_marquardt(problem, *begun, rule.steps_with_links)
     return loaded if cost_of(problem, loaded.residual, weights)[0] < (1 - rule.load_takes) * cost else fit
 
 
@@ -34,7 +34,7 @@ def _promising(
     problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, least: float
 ) -> list[Candidate]:
     """Masses, best first, that each take at least so much cost away by slopes, beside the fit and those before them."""
-    masses = [c for c in candidates if c.effect == "link_mass" and is_whole(c) and not is_chosen(c, fit.chosen)]
+    masses = [c for c in candidates if c.effect == "link_mass" and c.step[1] != 0 and not is_chosen(c, fit.chosen)]
     if not masses:
         return []
     columns = Columns(masses, problem.sensitivities(masses, fit.effects))

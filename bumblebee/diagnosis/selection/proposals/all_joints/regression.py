@@ -1,13 +1,15 @@
 """Least squares of the lacking torque on candidates' torques, within bounds, by how far each joint moves."""
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from bumblebee.diagnosis.candidates import Candidate, absent
-from bumblebee.diagnosis.sensitivities import LackingTorque
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.sensitivities import LackingTorque, basis_of, without
 from bumblebee.sim.effects import CATALOGUE
 from bumblebee.sim.servo import servos_of
 
@@ -15,7 +17,23 @@ PROPORTIONAL, DAMPING = "kp", "viscous_friction"
 SCALES = ("motor_strength", PROPORTIONAL)
 """Effects that scale what a drive gives."""
 _NOTHING = 1e-6
-"""Share of a joint's lacking torque that is nothing."""
+"""Share of the lacking torque that is nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """All candidates' torques by how far each joint moves and by a scale, less what the ground may do."""
+
+    weights: np.ndarray
+    """(N, nv) [1/(N m)]."""
+    ground: np.ndarray
+    """(N, nv, M) orthogonal, zeros where the ground can do less."""
+    columns: np.ndarray
+    """(N nv, P)."""
+
+    def target(self, torque: np.ndarray) -> np.ndarray:
+        """Torque (N, nv) alike, (N nv,)."""
+        return without((torque * self.weights)[..., None], self.ground).ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +44,13 @@ class Regressed:
     sizes: np.ndarray
     """(P,) in their steps."""
     left: np.ndarray
-    """(N, nv) torque that they leave [N m], by how far each joint moves."""
-    scale: np.ndarray
-    """(nv,) of it, by which it is weighed."""
+    """(N nv,) that they leave, weighed."""
+    by: Weighed
 
     @property
     def cost(self) -> float:
         """Sum of squares."""
-        return float(((self.left / self.scale) ** 2).sum())
+        return float((self.left**2).sum())
 
 
 class Regression:
@@ -41,12 +58,14 @@ class Regression:
 
     A drive's strength f is asked as what it takes of the torque that the motion asks, (1 - 1 / f) of it, and friction
     that goes with load by that torque too: as shares of the drive's own they would explain it away. A servo's kp is
-    asked alike, of what its damping does not give. Damping may be less than none by as much as a servo has.
+    asked alike, of what its damping does not give. Damping may be less than none by as much as a servo has. Of drives
+    that are taken to be within their limits no scale is larger than that allows.
     """
 
     def __init__(self, lacking: LackingTorque, candidates: Sequence[Candidate], rounds: int) -> None:
-        self._rounds, self._shape = rounds, (-1, lacking.asked.shape[-1])
+        self._rounds, self._shape = rounds, (-1, lacking.moved.shape[-1])
         self._moving = lacking.moving().reshape(self._shape)
+        self._ground = lacking.ground.reshape(*self._moving.shape, -1)
         self._torques = [self._flat(lacking.signatures.of(c)) for c in candidates]
         self._bounds = [_bounds(lacking, c) for c in candidates]
         asked, damped = lacking.asked.reshape(self._shape), lacking.damped().reshape(self._shape)
@@ -57,31 +76,32 @@ class Regression:
                 self._torques[k] = c.step[0] * np.where(own, of, 0.0)
             elif CATALOGUE[c.effect].standard == "drive":
                 self._torques[k] = c.step[0] * np.sign(own) * np.abs(np.where(own, asked, 0.0))
-        self._torques = [torques * self._moving for torques in self._torques]
 
-    def fit(self, lacking: np.ndarray, chosen: Sequence[int], scale: np.ndarray | None = None) -> Regressed:
-        """Fit some, by a scale or by that of what they leave."""
-        wanted = lacking.reshape(self._shape) * self._moving
-        least = _NOTHING * self._mean(wanted)
-        torques = np.concatenate([self._torques[k] for k in chosen])
+        ends = np.cumsum([0, *(len(torques) for torques in self._torques)])
+        self._columns = [np.arange(*two) for two in itertools.pairwise(ends)]
+
+    def fit(self, lacking: np.ndarray, chosen: Sequence[int], by: Weighed | None = None) -> Regressed:
+        """Fit some, weighed as given, or by what they leave."""
+        wanted = lacking.reshape(self._shape)
+        rounds, by = (1, by) if by else (self._rounds, self._weighed(wanted * self._moving))
         low, high = np.concatenate([self._bounds[k] for k in chosen], axis=1)
-        given, scale = scale is not None, self._scale(wanted, least) if scale is None else scale
-        for _ in range(1 if given else self._rounds):
-            basis, triangle = np.linalg.qr((torques / scale).reshape(len(torques), -1).T)
-            sizes = lsq_linear(triangle, basis.T @ (wanted / scale).ravel(), (low, high), method="bvls").x
-            left = wanted - np.tensordot(sizes, torques, axes=1)
-            fit = Regressed(tuple(chosen), sizes, left, scale)
-            scale = scale if given else self._scale(left, least)
-        return replace(fit, scale=scale)
+        for number in range(rounds):
+            columns, target = by.columns[:, self._of(chosen)], by.target(wanted)
+            basis, triangle = np.linalg.qr(columns)
+            sizes = lsq_linear(triangle, basis.T @ target, (low, high), method="bvls").x
+            left = target - columns @ sizes
+            fit = Regressed(tuple(chosen), sizes, left, by)
+            if number < rounds - 1:
+                by = self._weighed(left.reshape(self._shape) * self._moving / np.maximum(by.weights, 1e-300))
+        return fit
 
     def best(self, fit: Regressed, rest: Sequence[int]) -> tuple[int, float, float]:
         """The one that would take most away beside a fit: which, how much of what is left as noise, which share."""
-        basis, _ = np.linalg.qr(self._columns(fit.chosen, fit.scale))
-        left = (fit.left / fit.scale).ravel()
-        left = left - basis @ (basis.T @ left)
+        basis, _ = np.linalg.qr(fit.by.columns[:, self._of(fit.chosen)])
+        left = fit.left - basis @ (basis.T @ fit.left)
         total, gains = left @ left, []
         for k in rest:
-            own = self._columns([k], fit.scale)
+            own = fit.by.columns[:, self._columns[k]]
             own = own - basis @ (basis.T @ own)
             gains.append(left @ own @ np.linalg.lstsq(own, left)[0])
         best = int(np.argmax(gains))
@@ -90,21 +110,21 @@ class Regression:
     def _flat(self, torques: np.ndarray) -> np.ndarray:
         return torques.reshape(len(torques), *self._moving.shape)
 
-    def _columns(self, chosen: Sequence[int], scale: np.ndarray) -> np.ndarray:
-        torques = np.concatenate([self._torques[k] for k in chosen])
-        return (torques / scale).reshape(len(torques), -1).T
+    def _of(self, chosen: Sequence[int]) -> np.ndarray:
+        return np.concatenate([self._columns[k] for k in chosen])
 
-    def _scale(self, left: np.ndarray, least: np.ndarray) -> np.ndarray:
-        return np.maximum(self._mean(left), np.maximum(least, 1e-300))
+    def _weighed(self, left: np.ndarray) -> Weighed:
+        """By mean sizes of torques (N, nv) where each joint moves."""
+        mean = np.abs(left).sum(axis=0) / np.maximum(self._moving.sum(axis=0), 1e-12)
+        weights = self._moving / np.maximum(mean, max(_NOTHING * float(mean.max()), 1e-300))
+        ground = basis_of(self._ground * weights[..., None])
+        torques = np.concatenate(self._torques).transpose(1, 2, 0) * weights[..., None]
+        return Weighed(weights, ground, without(torques, ground).reshape(-1, torques.shape[-1]))
 
-    def _mean(self, left: np.ndarray) -> np.ndarray:
-        """Mean sizes (nv,) where each joint moves."""
-        return np.abs(left).sum(axis=0) / np.maximum(self._moving.sum(axis=0), 1e-12)
 
-
-def own_damping(lacking: LackingTorque, joint: str) -> float:
+def own_damping(problem: Problem, joint: str) -> float:
     """A servo's kd [N m s/rad]; 0 where a drive has none."""
-    model = lacking.problem.plant.model
+    model = problem.plant.model
     return max(-float(servos_of(model, [int(model.joint(joint).id)]).bias[0, 2]), 0.0)
 
 
@@ -113,6 +133,8 @@ def _bounds(lacking: LackingTorque, c: Candidate) -> np.ndarray:
     free = list(c.free)
     ends = np.stack(CATALOGUE[c.effect].bounds(c.nominal, c.limits)) - absent([c])
     if c.effect == DAMPING:
-        ends[0] -= own_damping(lacking, c.where)
+        ends[0] -= own_damping(lacking.problem, c.where)
+    if c.effect in SCALES:
+        ends[1] = np.minimum(ends[1], lacking.largest_scales.get(c.where, np.inf) - absent([c]))
     sizes = np.sort(ends[:, free] / np.array(c.step)[free], axis=0)
     return np.sort((1 - 1 / (1 + c.step[0] * sizes)) / c.step[0], axis=0) if c.effect in SCALES else sizes

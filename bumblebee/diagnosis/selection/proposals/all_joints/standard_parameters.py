@@ -5,12 +5,16 @@ beyond all measure. On the measured motion torques are linear in the standard pa
 1986), and one least-squares fit within bounds finds all of them. Every joint's friction and rotor are in it; others
 come in one after the other: loads and springs at the drives' declared strengths, or strengths and friction that goes
 with load at the links' declared masses. Both together have no scale: a drive of no strength on links of no mass
-explains every log. What comes in must leave less by far in the simulator than every joint's alone. How late commands
-are is a profile: what all effects together leave, over the whole range. Noise in velocities makes rotors and friction
-look small and commands late, so a fit that begins at none is asked first.
+explains every log. What comes in must leave less by far in the simulator than every joint's alone. A drive declared far
+too strong is always at its limit, and tells nothing: so drives are also taken to have been within their limits
+everywhere, each by a scale that makes them be. How late commands are is a profile: what all effects together leave,
+over the whole range. Noise in velocities makes rotors and friction look small and commands late, so a fit that begins
+at none is asked first.
 """
 
+import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -18,7 +22,6 @@ from scipy.stats import chi2
 
 from bumblebee.diagnosis.candidates import USUAL_OF_ROBOT, Candidate, absent, clipped, effects_at, is_chosen
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.selection.proposals.all_joints.begun import Begun
 from bumblebee.diagnosis.selection.proposals.all_joints.regression import (
     DAMPING,
     SCALES,
@@ -27,8 +30,10 @@ from bumblebee.diagnosis.selection.proposals.all_joints.regression import (
     own_damping,
 )
 from bumblebee.diagnosis.sensitivities import LackingTorque, lacking_torque
-from bumblebee.sim.effects import CATALOGUE
+from bumblebee.sim.effects import CATALOGUE, Effect
 
+Begun = tuple[Sequence[Candidate], np.ndarray]
+"""Effects and the values (P,) that their fit begins with."""
 _GAIN = "kd"
 
 
@@ -38,15 +43,15 @@ def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level
     Each at no delay, and at the likeliest. False alarms of what comes in one after the other are held to `level`.
     Without any drive nothing says how heavy the links are. Empty where no joint moves.
     """
-    lacking, robot = lacking_torque(problem), [c for c in candidates if c.effect in USUAL_OF_ROBOT and not c.where]
-    every = [c for c in candidates if CATALOGUE[c.effect].standard]
-    regression = Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
-    several, begun = [[k for k, c in enumerate(every) if _is_first(c)]], []
-    for scale in ("drive", "link") if (problem.plant.actuator >= 0).any() else ("drive",):
-        several.append([k for k, c in enumerate(every) if CATALOGUE[c.effect].standard in ("joint", scale)])
-    for among in several if several[0] else ():
-        for late in _delays(regression, [k for k in among if len(every[k].free) == 1], lacking, robot):
-            fit = _chosen(regression, lacking.after(effects_at(robot, late)), every, among, problem, level)
+    declared, robot = lacking_torque(problem), [c for c in candidates if c.effect in USUAL_OF_ROBOT and not c.where]
+    every, begun = [c for c in candidates if CATALOGUE[c.effect].standard], []
+    within = replace(declared, within=True)
+    for lacking in [declared, within] if within.largest_scales else [declared]:
+        regression = Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
+        sets = _sets(lacking, every)
+        delays = _delays(regression, sets[0][0], lacking, robot) if sets else []
+        for (first, more), late in itertools.product(sets, delays):
+            fit = _chosen(regression, lacking, effects_at(robot, late), every, first, more, level)
             effects, values = _as_values(lacking, [every[k] for k in fit.chosen], fit.sizes, candidates)
             begun.append(([*effects, *robot], np.concatenate((values, late))))
     return [b for k, b in enumerate(begun) if not any(_same(b, other, robot) for other in begun[:k])]
@@ -58,51 +63,65 @@ def _same(one: Begun, other: Begun, robot: Sequence[Candidate]) -> bool:
     return set(one[0]) == set(other[0]) and late
 
 
+def _sets(lacking: LackingTorque, every: Sequence[Candidate]) -> list[tuple[list[int], list[int]]]:
+    """Which of `every` candidate there are from the start, and which may come in beside them.
+
+    Every joint's alone, drives' strengths alone, every joint's beside drives' and, as the drives are declared, links'.
+    """
+    first = [k for k, c in enumerate(every) if _is_first(c, lacking)]
+    strengths = [k for k, c in enumerate(every) if c.effect == SCALES[0]]
+    driven, plant = (lacking.problem.plant.actuator >= 0).any(), lacking.problem.plant
+    # What the links of a robot on the ground weigh its legs do not tell.
+    scales = ("drive", "link") if driven and not lacking.within and not plant.floating else ("drive",)
+    more = [[k for k, c in enumerate(every) if CATALOGUE[c.effect].standard in ("joint", of)] for of in scales]
+    beside = [(first, [k for k in some if k not in first]) for some in more]
+    return [s for s in ((first, []), (strengths, []), *beside) if s[0]] if first else []
+
+
 def _chosen(
     regression: Regression,
-    lacking: np.ndarray,
+    lacking: LackingTorque,
+    late: Sequence[Effect],
     every: Sequence[Candidate],
-    among: Sequence[int],
-    problem: Problem,
+    first: Sequence[int],
+    more: Sequence[int],
     level: float,
 ) -> Regressed:
-    """Every joint's effects, and of those `among` all of `every` those that come in beside them."""
-    least = problem.thresholds.comparison.validation.least_share
-    fit = regression.fit(lacking, [k for k in among if _is_first(every[k])])
-    for most in sorted({len(every[k].free) for k in among}):  # few numbers first: a mass before a centre of mass
-        rest = [k for k in among if len(every[k].free) <= most and _is_open(every[k], every, fit)]
+    """The `first` of all candidates, and those of `more` that come in beside them."""
+    least, torque = lacking.problem.thresholds.comparison.validation.least_share, lacking.after(late)
+    fit = regression.fit(torque, first)
+    for most in sorted({len(every[k].free) for k in more}):  # few numbers first: a mass before a centre of mass
+        rest = [k for k in more if len(every[k].free) <= most and _is_open(every[k], every, fit)]
         while rest:
             k, gain, share = regression.best(fit, rest)
-            if share < least or gain < chi2.isf(level / len(among), len(every[k].free)):
+            if share < least or gain < chi2.isf(level / (len(first) + len(more)), len(every[k].free)):
                 break
-            larger = regression.fit(lacking, [*fit.chosen, k], fit.scale)
+            larger = regression.fit(torque, [*fit.chosen, k], fit.by)
             rest.remove(k)
             if larger.cost < (1 - least) * fit.cost:
-                fit = regression.fit(lacking, larger.chosen)
+                fit = regression.fit(torque, larger.chosen)
                 rest = [r for r in rest if _is_open(every[r], every, fit)]
     return fit
 
 
 def _delays(
-    regression: Regression, among: Sequence[int], lacking: LackingTorque, robot: Sequence[Candidate]
+    regression: Regression, first: Sequence[int], lacking: LackingTorque, robot: Sequence[Candidate]
 ) -> list[np.ndarray]:
-    """None, and where what effects leave together is least over the whole range (1,), if that differs."""
+    """None, and where what every joint's effects leave is least over the whole range (1,), if that differs."""
+    none = absent(robot)
     if [c.effect for c in robot] != ["command_delay"]:
-        return [absent(robot)]
+        return [none]
+    by = regression.fit(lacking.after(effects_at(robot, none)), first).by
 
     def left(delay: float) -> float:
-        fit = regression.fit(lacking.after(effects_at(robot, np.array([delay]))), among)
-        return float(np.log(fit.scale).sum())
+        return regression.fit(lacking.after(effects_at(robot, np.array([delay]))), first, by).cost
 
     low, high = (float(end[0]) for end in CATALOGUE["command_delay"].bounds(robot[0].nominal, robot[0].limits))
     grid = np.linspace(low, high, lacking.problem.thresholds.selection.proposals.all_joints.delays)
     k = int(np.argmin([left(delay) for delay in grid]))
     ends = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
-    found = np.array(
-        [minimize_scalar(left, bounds=ends, method="bounded", options={"xatol": 0.1 * robot[0].step[0]}).x]
-    )
-    none = absent(robot)
-    return [none, found] if abs(found[0] - none[0]) > robot[0].step[0] else [none]
+    found = minimize_scalar(left, bounds=ends, method="bounded", options={"xatol": 0.1 * robot[0].step[0]}).x
+    return [none, np.array([found])] if abs(found - none[0]) > robot[0].step[0] else [none]
 
 
 def _is_open(c: Candidate, every: Sequence[Candidate], fit: Regressed) -> bool:
@@ -111,8 +130,10 @@ def _is_open(c: Candidate, every: Sequence[Candidate], fit: Regressed) -> bool:
     return not scaled and not is_chosen(c, chosen)
 
 
-def _is_first(c: Candidate) -> bool:
-    """Whether every joint has it: its friction, its rotor."""
+def _is_first(c: Candidate, lacking: LackingTorque) -> bool:
+    """Whether every joint has it: its friction, its rotor, and a drive that is too strong its scale."""
+    if c.effect == SCALES[0] and c.where in lacking.largest_scales:
+        return True
     return CATALOGUE[c.effect].standard == "joint" and CATALOGUE[c.effect].usual == "joint"
 
 
@@ -134,7 +155,7 @@ def _as_values(
     there = {(c.effect, c.where): c for c in candidates}
     for friction in [c for c in effects if c.effect == DAMPING]:
         servo = [there[kind, friction.where] for kind in (*SCALES, _GAIN) if (kind, friction.where) in there]
-        if len(servo) == 3 and (declared := own_damping(lacking, friction.where)):
+        if len(servo) == 3 and (declared := own_damping(lacking.problem, friction.where)):
             _plainest(found, friction, servo, declared)
     return list(found), clipped(list(found), np.concatenate(list(found.values())))
 

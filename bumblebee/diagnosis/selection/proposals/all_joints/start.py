@@ -1,4 +1,4 @@
-"""When a search begins anew with the usual effects of all joints, and how it goes on from there."""
+"""When a search begins anew with the standard parameters of all joints, and how it goes on from there."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,12 +9,11 @@ from bumblebee.diagnosis.comparison import Holdout, compare
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Expecting
-from bumblebee.diagnosis.selection.proposals.all_joints.begun import usual_effects
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import (
-    fit_all_joints,
     is_fixed,
     simulated,
     sure_among,
+    sure_on_the_ground,
 )
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.selection.state import SearchState
@@ -49,25 +48,21 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     return replace(made, between=problem.between)
 
 
-def all_joints_of(run: SearchState, below: float = np.inf) -> Asking[Fit | None]:
-    """Fit the usual effects of all joints, see `fit_all_joints`; all of them may come at once.
-
-    Of a robot on a fixed base its standard parameters, by inverse dynamics.
-    """
-    if is_fixed(run.problem):
-        begun = standard_parameters(run.problem, run.candidates, run.config.level)
-        if not begun:
-            return None
-        yield Expecting(max(len(chosen) for chosen, _ in begun))
-        fit = simulated(run.problem, begun)
-        run.say(f"{len(fit.chosen)} standard parameters by inverse dynamics: chi-square {fit.power(run.problem):.3g}")
-        return fit
-    yield Expecting(len(usual_effects(run.candidates)))
-    return fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
+def all_joints_of(run: SearchState) -> Asking[Fit | None]:
+    """Standard parameters of all joints by inverse dynamics, fitted on in the simulator; many may come at once."""
+    begun = standard_parameters(run.problem, run.candidates, run.config.level)
+    if not begun:
+        return None
+    yield Expecting(max(len(chosen) for chosen, _ in begun))
+    if not is_fixed(run.problem):
+        return sure_on_the_ground(run.problem, begun, run.candidates, run.say)
+    fit = simulated(run.problem, begun)
+    run.say(f"{len(fit.chosen)} standard parameters by inverse dynamics: chi-square {fit.power(run.problem):.3g}")
+    return fit
 
 
 def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]:
-    """Begin anew with the usual effects of all joints, where some effects leave large residuals; whether it did.
+    """Begin anew with the standard parameters of all joints, where some effects leave large residuals; whether it did.
 
     Only if the last of these explained little, or they are very large: else the next may explain the rest. Where the
     windows were whitened far from here they are whitened anew first, and that may be all there is to it. If no effect
@@ -93,7 +88,7 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> Asking[bool]
 
 
 def start_far_off(run: SearchState, tried: Sequence[Trial]) -> Asking[bool]:
-    """Begin with the usual effects of all joints of a robot that is far from the data; whether it did.
+    """Begin with the standard parameters of all joints of a robot that is far from the data; whether it did.
 
     Only before anything is found, where they leave next to nothing, and where no effect that was `tried` by itself
     comes near. A search effect by effect converges to a wrong local minimum where every joint errs by factors.

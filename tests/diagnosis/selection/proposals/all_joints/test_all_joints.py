@@ -1,8 +1,6 @@
 """Parameters that are wrong on all joints at once are found together and by name."""
 
-import re
 from collections.abc import Callable
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,11 +18,11 @@ from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.changes import Anew, Asked, Asking, Change
-from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints, start
-from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of, usual_effects
+from bumblebee.diagnosis.selection.proposals.all_joints import start
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import sure_on_the_ground
+from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds import Thresholds
-from bumblebee.sim.servo import servos_of
 from tests.diagnosis import arm
 from tests.diagnosis.selection.begun import answered
 
@@ -47,6 +45,13 @@ def _opened(effects: dict[tuple[str, str], float]) -> tuple[Session, Problem, Pr
     return session, of([0, 1], 40), of([2], 20)
 
 
+def _fit_of(session: Session, problem: Problem) -> Fit | None:
+    """As of a robot whose base is free."""
+    candidates = all_candidates(session.plant, session.rollouts, [])
+    begun = standard_parameters(problem, candidates, SearchConfig().level)
+    return sure_on_the_ground(problem, begun, candidates, lambda text: None)
+
+
 def pays(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
     return compare(problem, holdout, before, after).passes(problem.thresholds.comparison.together)
 
@@ -54,7 +59,7 @@ def pays(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
 def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None:
     session, problem, other = _opened(TRUTH)
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
-    fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
+    fit = _fit_of(session, problem)
     assert fit is not None
     found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
     for place, value in TRUTH.items():
@@ -66,28 +71,16 @@ def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None
     assert pays(problem, Holdout(), declared, fit) and not pays(problem, Holdout(), fit, declared)
 
 
-def test_without_candidates_there_is_no_fit() -> None:
+def test_without_candidates_nothing_begins() -> None:
     _, problem, _ = _opened({})
-    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
-    assert fit_all_joints(problem, [], declared, lambda text: None) is None
-
-
-def test_a_load_that_was_found_stays_and_the_drives_are_not_weak() -> None:
-    """A heavier last link weakens all drives as far as these alone can tell."""
-    session, problem, _ = _opened({("link_mass", "l3"): 0.9})
-    candidates = all_candidates(session.plant, session.rollouts, [])
-    mass = next(c for c in candidates if (c.effect, c.where) == ("link_mass", "l3"))
-    start = gauss_newton(problem, (mass,), mass.start, np.ones(len(problem.windows)))
-    fit = fit_all_joints(problem, candidates, start, lambda text: None)
-    assert fit is not None and fit.of(mass)[0] == pytest.approx(0.9, rel=0.02)
-    assert not [c for c in fit.chosen if c.effect == "motor_strength"]
+    assert standard_parameters(problem, [], SearchConfig().level) == []
 
 
 def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
     """Another integrator looks like a little inertia on every joint."""
     session, problem, other = _opened({})
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
-    fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
+    fit = _fit_of(session, problem)
     assert fit is None or not pays(problem, Holdout(other), declared, fit)
 
 
@@ -235,44 +228,3 @@ def test_what_left_too_much_to_begin_with_is_asked_again_where_nothing_helps(mon
     run.fit, run.asked_far = SimpleNamespace(chosen=()), True
     began, asked = _took(run, start.start_with_all_joints(run, stuck=True))
     assert began and [change.fit for change in asked if isinstance(change, Anew)] == ["a fit"]
-
-
-DRAWN = re.sub(r'armature="[.0-9]+"', 'armature="0"', arm.XML)
-ROTORS = {("armature", j): v for j, v in zip(arm.JOINTS, (0.5, 0.6, 0.3), strict=True)}
-
-
-def test_rotors_and_friction_of_a_free_base_begin_at_likely_sizes_where_none_are_declared() -> None:
-    session = arm.session_of(arm.simulate({}, count=1, seconds=2.0, xml=DRAWN), DRAWN)
-    problem = arm.problem_of(session, [0], 4)
-    usual = usual_effects(all_candidates(session.plant, session.rollouts, []))
-    first, strengths, gains = sets_of(usual, all_candidates(session.plant, session.rollouts, []))
-    assert {c.effect for c in strengths} == {"motor_strength"} and {c.effect for c in gains} == {"kp"}
-    assert {c.effect for c in usual} - {c.effect for c in first} == {"motor_strength"}
-    model = session.plant.model
-    values = dict(zip([(c.effect, c.where) for c in first], likely_values(problem, first), strict=True))
-    servo = servos_of(model, [int(model.joint(j).id) for j in arm.JOINTS])
-    for k, joint in enumerate(arm.JOINTS):
-        damping = -servo.bias[k, 2] + model.dof_damping[servo.dof[k]]
-        assert values["armature", joint] == pytest.approx(damping**2 / (-4 * servo.bias[k, 1]))
-        limit = servo.limit[k]
-        assert values["coulomb_friction", joint] == pytest.approx(0.01 * limit if np.isfinite(limit) else 0.0)
-        assert values["viscous_friction", joint] == model.dof_damping[servo.dof[k]]
-    declared = [replace(c, nominal=(0.02,)) if c.effect == "armature" else c for c in first]
-    kept = dict(zip([(c.effect, c.where) for c in declared], likely_values(problem, declared), strict=True))
-    assert all(kept["armature", joint] == 0.02 for joint in arm.JOINTS)
-
-
-def test_a_robot_from_a_drawing_with_half_the_damping_is_found() -> None:
-    """Beside a kd that is too large friction cannot be less than none; another start leaves `below` too."""
-    softer = re.sub(r'kv="(\d+)"', lambda m: f'kv="{int(m[1]) / 2}"', DRAWN)
-    rollouts = arm.simulate({**TRUTH, **ROTORS}, count=3, seconds=5.0, xml=softer)
-    session = arm.session_of(rollouts, DRAWN)
-    windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0, 1], 0.2, 40))
-    rng = np.random.default_rng(0)
-    problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
-    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
-    fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, str, below=30.0)
-    assert fit is not None and fit.power(problem) < 30.0
-    found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
-    for place, rotor in ROTORS.items():
-        assert found[place] == pytest.approx(rotor, rel=0.1), place

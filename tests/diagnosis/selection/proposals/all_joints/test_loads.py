@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.candidates import Candidate, absent
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.levenberg_marquardt import levenberg_marquardt
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
-from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
-from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of, usual_effects
+from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import sure_on_the_ground
 from bumblebee.diagnosis.selection.proposals.all_joints.loads import with_loads
 from tests.diagnosis import arm
 
@@ -24,9 +23,15 @@ def _problem(masses: dict[str, float]) -> tuple[Problem, list[Candidate]]:
     return arm.problem_of(session, [0, 1], 40), all_candidates(session.plant, session.rollouts, [])
 
 
+def _begun(candidates: Sequence[Candidate]) -> tuple[list[Candidate], np.ndarray]:
+    """Friction, damping and rotors of all joints, and their offsets, which share a load out among themselves."""
+    kinds = ("coulomb_friction", "viscous_friction", "armature", "encoder_offset")
+    chosen = [c for c in candidates if c.effect in kinds and c.where]
+    return chosen, np.array(absent(chosen))
+
+
 def _joints(problem: Problem, candidates: Sequence[Candidate]) -> Fit:
-    first, *_ = sets_of(usual_effects(candidates), candidates)
-    return levenberg_marquardt(problem, first, likely_values(problem, first), 9)
+    return levenberg_marquardt(problem, *_begun(candidates), 9)
 
 
 @pytest.mark.parametrize("masses", [{"l3": 0.9}, {"l2": 1.2}, {"l2": 2.6, "l3": 0.9}])
@@ -44,13 +49,12 @@ def test_no_mass_comes_beside_the_joints_of_a_robot_whose_masses_are_right() -> 
     problem, candidates = _problem({})
     joints = _joints(problem, candidates)
     assert with_loads(problem, joints, candidates) is joints
-    assert with_loads(problem, joints, usual_effects(candidates)) is joints
+    assert with_loads(problem, joints, _begun(candidates)[0]) is joints
 
 
 def test_a_load_stays_among_what_is_sure() -> None:
     problem, candidates = _problem({"l3": 0.9})
-    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
-    fit = fit_all_joints(problem, candidates, declared, lambda text: None)
+    fit = sure_on_the_ground(problem, [_begun(candidates)], candidates, lambda text: None)
     assert fit is not None
     found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
     assert found["link_mass", "l3"] == pytest.approx(0.9, rel=0.05)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates import Candidate, all_candidates
-from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.dataset import Session, make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.quick import first_look, told
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.sensitivities import lacking_torque
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import CATALOGUE
-from tests.diagnosis import arm
+from tests.diagnosis import arm, stander
 
 JOINTS = ("j1", "j2", "j3")
 ROTORS, DRY, VISCOUS = (0.4, 0.1, 0.02), (2.0, 1.0, 0.3), (3.0, 1.0, 0.2)
@@ -70,12 +70,17 @@ def rollouts(true: str, arrives: tuple[float, ...] = (1.0, 1.0, 1.0), count: int
 
 def regressed(logs: list[Rollout]) -> list[dict[tuple[str, str], np.ndarray]]:
     """Values by (effect, place) of the regressions: every joint's alone, beside the drives', beside the links'."""
-    return _regressed(arm.session_of(logs, xml()))
+    return _with_friction(_regressed(arm.session_of(logs, xml())))
 
 
 def servos(truth: dict[tuple[str, str], float], true: str = arm.XML) -> list[dict[tuple[str, str], np.ndarray]]:
     """Those of the arm that is told positions."""
-    return _regressed(arm.session_of(arm.simulate(truth, count=3, seconds=6.0, xml=true)))
+    return _with_friction(_regressed(arm.session_of(arm.simulate(truth, count=3, seconds=6.0, xml=true))))
+
+
+def _with_friction(several: list[dict[tuple[str, str], np.ndarray]]) -> list[dict[tuple[str, str], np.ndarray]]:
+    """Those that are not of strengths alone."""
+    return [found for found in several if "coulomb_friction" in {kind for kind, _ in found}]
 
 
 def _regressed(session: Session) -> list[dict[tuple[str, str], np.ndarray]]:
@@ -118,6 +123,7 @@ def test_a_load_is_told_at_the_declared_strengths() -> None:
 
 
 DRAWN = {("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (2.0, 3.0, 0.8), strict=True)}
+DAMPING_OF_SERVOS = (3.0, 4.0, 2.0)
 ROTORS_OF_SERVOS = {("armature", j): v for j, v in zip(arm.JOINTS, (0.4, 0.6, 0.15), strict=True)}
 
 
@@ -154,6 +160,43 @@ def test_a_servo_of_half_the_kp_or_of_half_the_strength_is_told(effect: str, tru
     assert len({("kp", "j2"), ("motor_strength", "j2")} & set(found)) == 1
     assert found["coulomb_friction", "j2"][0] == pytest.approx(3.0, rel=0.1)
     assert found.get(("viscous_friction", "j2"), np.zeros(1))[0] < 0.3
+
+
+@pytest.mark.parametrize("truth", [{}, DRAWN])
+@pytest.mark.parametrize(("kp", "kd"), [(30, 10), (100, 30)])
+def test_a_drive_declared_far_too_strong_is_told_by_where_it_would_not_have_been_at_its_limit(
+    truth: dict[tuple[str, str], float], kp: int, kd: int
+) -> None:
+    """At its declared gains it is always at its limit, whatever the joint does."""
+    stiff = re.sub(r'kp="(\d+)"', lambda m: f'kp="{kp * int(m[1])}"', arm.XML)
+    declared = re.sub(r'kv="(\d+)"', lambda m: f'kv="{kd * int(m[1])}"', stiff)
+    session = arm.session_of(arm.simulate(truth, count=3, seconds=6.0), declared)
+    found = _regressed(session)[-1]
+    for joint, damping in zip(arm.JOINTS, DAMPING_OF_SERVOS, strict=True):
+        assert found["motor_strength", joint][0] == pytest.approx(1 / kp, rel=0.2)
+        more = damping * (1 - kd / kp)  # of the declared kd, kd / kp go with the strength
+        assert found["viscous_friction", joint][0] == pytest.approx(more, rel=0.3)
+        assert found["coulomb_friction", joint][0] == pytest.approx(
+            truth.get(("coulomb_friction", joint), 0.0), rel=0.15, abs=0.1
+        )
+
+
+def test_strengths_alone_are_offered_too() -> None:
+    """A servo that is four times as stiff moves within a tick, and friction and rotors then explain half of it."""
+    session = arm.session_of(arm.simulate({("motor_strength", j): 4.0 for j in arm.JOINTS}, count=3, seconds=6.0))
+    found = next(f for f in _regressed(session) if {kind for kind, _ in f} == {"motor_strength", "command_delay"})
+    assert all(1.2 < found["motor_strength", j][0] < 5.0 for j in arm.JOINTS)
+
+
+def test_a_joint_of_a_robot_on_the_ground_is_told_whatever_the_ground_does() -> None:
+    rollouts, _ = stander.simulate(
+        count=3, xml=stander.XML.replace('armature=".01"', 'armature=".06" frictionloss="1"')
+    )
+    session = make_session(mujoco.MjSpec.from_string(stander.XML), rollouts, "stander", "x")
+    found = _regressed(session)[0]
+    assert found["coulomb_friction", "swing"][0] == pytest.approx(1.0, rel=0.1)
+    assert found["armature", "swing"][0] == pytest.approx(0.06, rel=0.3)
+    assert not any(kind.startswith("link") for kind, _ in found)
 
 
 def test_every_conditions_model_stays_as_it_was() -> None:
