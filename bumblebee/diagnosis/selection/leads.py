@@ -11,7 +11,13 @@ from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.moves import Terms, refitted
-from bumblebee.diagnosis.selection.proposals.all_joints import all_joints_of, is_fixed, is_nearer
+from bumblebee.diagnosis.selection.proposals.all_joints import (
+    all_joints_of,
+    is_fixed,
+    is_nearer,
+    not_simulated,
+    standard_parameters,
+)
 from bumblebee.diagnosis.selection.rounds import SINGLE, Kept, Round, ask
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.steps import go
@@ -85,13 +91,21 @@ def leads(
 
 
 def _standard(run: SearchState, tried: Sequence[Trial]) -> Fit | None:
-    """Standard parameters of a robot on a fixed base whose model is far off, if no trial comes near; only sure ones."""
-    if run.power() < run.config.far or not is_fixed(run.problem):
+    """Standard parameters of a robot whose model is far off, if no trial comes near; only sure ones.
+
+    On a free base as inverse dynamics say them: to fit them in the simulator takes a minute or two.
+    """
+    if run.power() < run.config.far:
         return None
-    fit = go(run, all_joints_of)
+    fit = go(run, all_joints_of) if is_fixed(run.problem) else _not_simulated(run)
     if fit is None or not is_nearer(run, fit, tried):
         return None
     return drop_unsure(run.problem, fit, window_weights(fit.clean(run.problem)))
+
+
+def _not_simulated(run: SearchState) -> Fit | None:
+    begun = standard_parameters(run.problem, run.candidates, run.config.level)
+    return not_simulated(run.problem, begun) if begun else None
 
 
 def _together(run: SearchState, gains: Fit) -> list[Lead]:

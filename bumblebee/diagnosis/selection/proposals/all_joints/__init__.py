@@ -12,7 +12,8 @@ dry friction, not by damping (`held_joints`). What is not sure is taken out agai
 that took no part; these and the fitted ones are then whitened anew, and the search goes on from there.
 """
 
-from bumblebee.diagnosis.selection.proposals.all_joints.fit import is_fixed
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import is_fixed, not_simulated
+from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.selection.proposals.all_joints.start import (
     all_joints_of,
     begun_with,
@@ -27,6 +28,8 @@ __all__ = [
     "begun_with",
     "is_fixed",
     "is_nearer",
+    "not_simulated",
+    "standard_parameters",
     "start_far_off",
     "start_with_all_joints",
     "whitened_anew",

@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, effects_at
 from bumblebee.diagnosis.comparison import drop_unsure
-from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, levenberg_marquardt
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, levenberg_marquardt, typical_power
 from bumblebee.diagnosis.residuals import Problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.proposals.all_joints.held_joints import held_by_dry_friction
 from bumblebee.diagnosis.selection.proposals.all_joints.loads import with_loads
@@ -23,6 +23,12 @@ def simulated(problem: Problem, several: Sequence[Begun]) -> Fit:
     return gauss_newton(problem, best.chosen, best.values, np.ones(len(problem.windows)), iterations=0)
 
 
+def not_simulated(problem: Problem, several: Sequence[Begun]) -> Fit:
+    """Whichever beginning leaves least, as it is."""
+    chosen, values = _nearest(problem, several)
+    return gauss_newton(problem, chosen, values, np.ones(len(problem.windows)), iterations=0)
+
+
 def sure_on_the_ground(
     problem: Problem, several: Sequence[Begun], candidates: Sequence[Candidate], say: Callable[[str], None]
 ) -> Fit | None:
@@ -32,8 +38,7 @@ def sure_on_the_ground(
     some of the windows, and what is not sure is taken out as far as the simulator bears it out.
     """
     some, rule = _some(problem), problem.thresholds.selection.proposals.all_joints
-    first = min(several, key=lambda begun: _left(some, begun))
-    fit = with_loads(some, levenberg_marquardt(some, *first, rule.steps), candidates)
+    fit = with_loads(some, levenberg_marquardt(some, *_nearest(some, several), rule.steps), candidates)
     say(f"{len(fit.chosen)} standard parameters and loads together: chi-square {fit.power(some):.3g}")
     chosen, values = held_by_dry_friction(some, fit)
     if len(chosen) < len(fit.chosen):
@@ -60,12 +65,15 @@ def _some(problem: Problem) -> Problem:
     return problem.part(screening_windows(problem, problem.thresholds.selection.proposals.all_joints.windows))
 
 
-def _left(problem: Problem, begun: Begun) -> float:
-    """Median chi-square that a beginning leaves."""
-    residual = problem.residual([effects_at(*begun)])[0]
-    _, nuisance = cost_of(problem, residual, window_weights(residual))
-    left = residual - np.tensordot(nuisance, problem.nuisance, axes=1)
-    return float(np.median((left**2).mean(axis=1)))
+def _nearest(problem: Problem, several: Sequence[Begun]) -> Begun:
+    """The beginning whose median chi-square is least."""
+
+    def left(begun: Begun) -> float:
+        residual = problem.residual([effects_at(*begun)])[0]
+        _, nuisance = cost_of(problem, residual, window_weights(residual))
+        return typical_power(residual - np.tensordot(nuisance, problem.nuisance, axes=1))
+
+    return min(several, key=left)
 
 
 def _better(problem: Problem, simple: Fit, other: Fit) -> Fit:

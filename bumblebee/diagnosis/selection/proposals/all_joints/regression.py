@@ -76,7 +76,6 @@ class Regression:
                 self._torques[k] = c.step[0] * np.where(own, of, 0.0)
             elif CATALOGUE[c.effect].standard == "drive":
                 self._torques[k] = c.step[0] * np.sign(own) * np.abs(np.where(own, asked, 0.0))
-
         ends = np.cumsum([0, *(len(torques) for torques in self._torques)])
         self._columns = [np.arange(*two) for two in itertools.pairwise(ends)]
 

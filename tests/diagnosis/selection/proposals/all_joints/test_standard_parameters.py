@@ -11,6 +11,7 @@ from bumblebee.diagnosis.candidates import Candidate, all_candidates
 from bumblebee.diagnosis.dataset import Session, make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.quick import first_look, told
+from bumblebee.diagnosis.selection.proposals.all_joints import start
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import standard_parameters
 from bumblebee.diagnosis.sensitivities import lacking_torque
 from bumblebee.measured.rollout import Rollout
@@ -230,6 +231,19 @@ def test_a_first_look_says_all_sizes() -> None:
     found = {(lead.candidate.effect, lead.candidate.where): float(lead.values[0]) for lead in look.leads.together}
     assert found == pytest.approx(TRUE, rel=0.25)
     assert "leads, standard parameters by inverse dynamics, explain" in told(look, "bumblebee diagnose")
+
+
+def test_a_first_look_at_a_robot_on_the_ground_says_them_as_inverse_dynamics_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is not fitted on in the simulator."""
+    monkeypatch.setattr(start, "sure_on_the_ground", None)
+    true = stander.XML.replace('armature=".01"', 'armature=".3" frictionloss="2" damping="4"')
+    rollouts, _ = stander.simulate(count=4, xml=true)
+    look = first_look(make_session(mujoco.MjSpec.from_string(stander.XML), rollouts, "stander", "x"))
+    found = {(lead.candidate.effect, lead.candidate.where): float(lead.values[0]) for lead in look.leads.together}
+    assert found["coulomb_friction", "swing"] == pytest.approx(2.0, rel=0.15)
+    assert look.leads.together[0].explains > 0.8 and look.leads.alone == []
 
 
 def _of_wrist(found: dict[tuple[str, str], tuple[float, ...]], what: str) -> np.ndarray:
