@@ -24,7 +24,7 @@ def simulated(problem: Problem, several: Sequence[Begun]) -> Fit:
 
 
 def not_simulated(problem: Problem, several: Sequence[Begun]) -> Fit:
-    """Whichever beginning leaves least, as it is."""
+    """The nearest beginning as it is."""
     chosen, values = _nearest(problem, several)
     return gauss_newton(problem, chosen, values, np.ones(len(problem.windows)), iterations=0)
 
@@ -34,7 +34,7 @@ def sure_on_the_ground(
 ) -> Fit | None:
     """Effects of a robot whose base is free, and its loads, that are sure together; None where nothing is.
 
-    A step of a G1's fit takes ten to twenty seconds of one core: from the beginning that leaves least it is gone, on
+    A step of a G1's fit takes ten to twenty seconds of one core: they are taken from the nearest beginning alone, on
     some of the windows, and what is not sure is taken out as far as the simulator bears it out.
     """
     some, rule = _some(problem), problem.thresholds.selection.proposals.all_joints
@@ -66,14 +66,18 @@ def _some(problem: Problem) -> Problem:
 
 
 def _nearest(problem: Problem, several: Sequence[Begun]) -> Begun:
-    """The beginning whose median chi-square is least."""
+    """The first beginning, or one whose median chi-square is less by far than those of all before it."""
 
     def left(begun: Begun) -> float:
         residual = problem.residual([effects_at(*begun)])[0]
         _, nuisance = cost_of(problem, residual, window_weights(residual))
         return typical_power(residual - np.tensordot(nuisance, problem.nuisance, axes=1))
 
-    return min(several, key=left)
+    enough = 1 - problem.thresholds.comparison.together.fall
+    powers = [left(begun) for begun in several]
+    return several[
+        reduce(lambda one, other: other if powers[other] < enough * powers[one] else one, range(len(powers)))
+    ]
 
 
 def _better(problem: Problem, simple: Fit, other: Fit) -> Fit:

@@ -58,7 +58,8 @@ class Regression:
 
     A drive's strength f is asked as what it takes of the torque that the motion asks, (1 - 1 / f) of it, and friction
     that goes with load by that torque too: as shares of the drive's own they would explain it away. A servo's kp is
-    asked alike, of what its damping does not give. Damping may be less than none by as much as a servo has. Of drives
+    asked alike, of what its damping does not give. Where the ground pushes nobody knows what the motion asks of a leg,
+    and its drive's own torque it is. Damping may be less than none by as much as a servo has. Of drives
     that are taken to be within their limits no scale is larger than that allows.
     """
 
@@ -71,6 +72,8 @@ class Regression:
         asked, damped = lacking.asked.reshape(self._shape), lacking.damped().reshape(self._shape)
         for k, c in enumerate(candidates):
             own = self._torques[k]
+            if lacking.problem.plant.floating:
+                continue
             if c.effect in SCALES:
                 of = asked - damped if c.effect == PROPORTIONAL else asked
                 self._torques[k] = c.step[0] * np.where(own, of, 0.0)
@@ -121,6 +124,11 @@ class Regression:
         return Weighed(weights, ground, without(torques, ground).reshape(-1, torques.shape[-1]))
 
 
+def is_share(lacking: LackingTorque, c: Candidate) -> bool:
+    """Whether a drive's scale is asked as a share of what the motion asks, not of what the drive gives."""
+    return c.effect in SCALES and not lacking.problem.plant.floating
+
+
 def own_damping(problem: Problem, joint: str) -> float:
     """A servo's kd [N m s/rad]; 0 where a drive has none."""
     model = problem.plant.model
@@ -136,4 +144,4 @@ def _bounds(lacking: LackingTorque, c: Candidate) -> np.ndarray:
     if c.effect in SCALES:
         ends[1] = np.minimum(ends[1], lacking.largest_scales.get(c.where, np.inf) - absent([c]))
     sizes = np.sort(ends[:, free] / np.array(c.step)[free], axis=0)
-    return np.sort((1 - 1 / (1 + c.step[0] * sizes)) / c.step[0], axis=0) if c.effect in SCALES else sizes
+    return np.sort((1 - 1 / (1 + c.step[0] * sizes)) / c.step[0], axis=0) if is_share(lacking, c) else sizes

@@ -27,6 +27,7 @@ from bumblebee.diagnosis.selection.proposals.all_joints.regression import (
     SCALES,
     Regressed,
     Regression,
+    is_share,
     own_damping,
 )
 from bumblebee.diagnosis.sensitivities import LackingTorque, lacking_torque
@@ -66,13 +67,16 @@ def _same(one: Begun, other: Begun, robot: Sequence[Candidate]) -> bool:
 def _sets(lacking: LackingTorque, every: Sequence[Candidate]) -> list[tuple[list[int], list[int]]]:
     """Which of `every` candidate there are from the start, and which may come in beside them.
 
-    Every joint's alone, drives' strengths alone, every joint's beside drives' and, as the drives are declared, links'.
+    Every joint's alone; drives' strengths alone; every joint's beside drives' and, as the drives are declared, links'.
+    Of a robot on the ground every joint's beside all strengths: no one of these makes a difference, and what its links
+    weigh its legs do not tell.
     """
     first = [k for k, c in enumerate(every) if _is_first(c, lacking)]
     strengths = [k for k, c in enumerate(every) if c.effect == SCALES[0]]
-    driven, plant = (lacking.problem.plant.actuator >= 0).any(), lacking.problem.plant
-    # What the links of a robot on the ground weigh its legs do not tell.
-    scales = ("drive", "link") if driven and not lacking.within and not plant.floating else ("drive",)
+    if lacking.problem.plant.floating:
+        return [(first, []), (sorted({*first, *strengths}), [])] if first else []
+    driven = (lacking.problem.plant.actuator >= 0).any()
+    scales = ("drive", "link") if driven and not lacking.within else ("drive",)
     more = [[k for k, c in enumerate(every) if CATALOGUE[c.effect].standard in ("joint", of)] for of in scales]
     beside = [(first, [k for k in some if k not in first]) for some in more]
     return [s for s in ((first, []), (strengths, []), *beside) if s[0]] if first else []
@@ -146,7 +150,7 @@ def _as_values(
     """
     own = np.split(sizes, np.cumsum([len(c.free) for c in effects])[:-1])
     scales = {
-        c.where: 1.0 / (1.0 - c.step[0] * size[0]) for c, size in zip(effects, own, strict=True) if c.effect in SCALES
+        c.where: 1.0 / (1.0 - c.step[0] * size[0]) for c, size in zip(effects, own, strict=True) if is_share(lacking, c)
     }
     found: dict[Candidate, np.ndarray] = {}
     for c, size in zip(effects, own, strict=True):
