@@ -75,7 +75,7 @@ def told(look: FirstLook, whole: str) -> str:
     lines += missing_lines(document, rules.verdicts)
     if found.together:
         share = 100 * found.together[0].explains
-        lines.append(f"leads, {found.what}, explain {share:.0f} %:")
+        lines.append(f"leads, standard parameters by inverse dynamics, explain {share:.0f} %:")
         lines += [
             f"  {place}: {', '.join(_sized(look, s, 2) for s in some)}" for place, some in _places(found.together)
         ]

@@ -27,7 +27,7 @@ from bumblebee.sim.effects import Effect
 
 @dataclass(frozen=True, eq=False)
 class Lead:
-    """One candidate, fitted alone, or one of the servos' gains that are far off together."""
+    """One candidate, fitted alone, or one of the standard parameters that are far off together."""
 
     candidate: Candidate
     values: np.ndarray
@@ -43,10 +43,9 @@ class Leads:
     """Findings of a first look."""
 
     together: list[Lead]
-    """Effects that were found at once, `what`; each explains what all do."""
+    """Standard parameters, found at once by inverse dynamics; each explains what all do."""
     alone: list[Lead]
     """Single effects where there are none of these, the best first."""
-    what: str = ""
 
 
 def leads(
@@ -58,7 +57,7 @@ def leads(
     count: int,
     quiet: Collection[str] = (),
 ) -> Leads:
-    """The servos' gains where these are far off, else the `count` candidates whose trials cost least.
+    """Standard parameters where these are far off, else the `count` candidates whose trials cost least.
 
     None of these on the joints `quiet`, whose residual shows nothing. An effect in one place is one lead, by the
     candidate whose trial costs least, however many of its parameters are tested together.
@@ -76,7 +75,7 @@ def leads(
     tried = now.tried if now.looked else [*now.tried, *run.trials()[0]]
     standard = attempt("standard parameters", lambda: _standard(run, tried), lambda: None)
     if standard is not None:
-        return Leads(_together(run, standard), [], "standard parameters by inverse dynamics")
+        return Leads(_together(run, standard), [])
     found = []
     cheapest: dict[tuple[str, str], Trial] = {}
     for trial in sorted(tried, key=lambda t: t.cost):
@@ -108,11 +107,11 @@ def _not_simulated(run: SearchState) -> Fit | None:
     return not_simulated(run.problem, begun) if begun else None
 
 
-def _together(run: SearchState, gains: Fit) -> list[Lead]:
+def _together(run: SearchState, fit: Fit) -> list[Lead]:
     """Effects that were found at once, joint by joint."""
-    share = _explains(run, run.fit, gains)
-    sizes = walds(run.problem, gains, window_weights(gains.clean(run.problem)), gains.chosen)
-    return [Lead(c, gains.of(c), float(z), share) for c, z in zip(gains.chosen, sizes, strict=True)]
+    share = _explains(run, run.fit, fit)
+    sizes = walds(run.problem, fit, window_weights(fit.clean(run.problem)), fit.chosen)
+    return [Lead(c, fit.of(c), float(z), share) for c, z in zip(fit.chosen, sizes, strict=True)]
 
 
 def _explains(run: SearchState, before: Fit, after: Fit) -> float:

@@ -1,4 +1,4 @@
-"""A candidate tried in the simulator at the size that its test suggests, and gains tried far from the declared ones."""
+"""A candidate tried in the simulator at the size that its test suggests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
