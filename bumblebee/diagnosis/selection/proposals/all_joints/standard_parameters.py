@@ -12,7 +12,6 @@ over the whole range. Noise in velocities makes rotors and friction look small a
 at none is asked first.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -49,12 +48,12 @@ def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level
     within = replace(declared, within=True)
     for lacking in [declared, within] if within.largest_scales else [declared]:
         regression = Regression(lacking, every, problem.thresholds.selection.proposals.all_joints.rounds)
-        sets = _sets(lacking, every)
-        delays = _delays(regression, sets[0][0], lacking, robot) if sets else []
-        for (first, more), late in itertools.product(sets, delays):
-            fit = _chosen(regression, lacking, effects_at(robot, late), every, first, more, level)
-            effects, values = _as_values(lacking, [every[k] for k in fit.chosen], fit.sizes, candidates)
-            begun.append(([*effects, *robot], np.concatenate((values, late))))
+        for first, more in _sets(lacking, every):
+            single = [k for k in more if len(every[k].free) == 1]
+            for late in _delays(regression, [*first, *single], lacking, robot):
+                fit = _chosen(regression, lacking, effects_at(robot, late), every, first, more, level)
+                effects, values = _as_values(lacking, [every[k] for k in fit.chosen], fit.sizes, candidates)
+                begun.append(([*effects, *robot], np.concatenate((values, late))))
     return [b for k, b in enumerate(begun) if not any(_same(b, other, robot) for other in begun[:k])]
 
 
@@ -109,16 +108,16 @@ def _chosen(
 
 
 def _delays(
-    regression: Regression, first: Sequence[int], lacking: LackingTorque, robot: Sequence[Candidate]
+    regression: Regression, among: Sequence[int], lacking: LackingTorque, robot: Sequence[Candidate]
 ) -> list[np.ndarray]:
-    """None, and where what every joint's effects leave is least over the whole range (1,), if that differs."""
+    """None, and where what effects leave together is least over the whole range (1,), if that differs."""
     none = absent(robot)
     if [c.effect for c in robot] != ["command_delay"]:
         return [none]
-    by = regression.fit(lacking.after(effects_at(robot, none)), first).by
+    by = regression.fit(lacking.after(effects_at(robot, none)), among).by
 
     def left(delay: float) -> float:
-        return regression.fit(lacking.after(effects_at(robot, np.array([delay]))), first, by).cost
+        return regression.fit(lacking.after(effects_at(robot, np.array([delay]))), among, by).cost
 
     low, high = (float(end[0]) for end in CATALOGUE["command_delay"].bounds(robot[0].nominal, robot[0].limits))
     grid = np.linspace(low, high, lacking.problem.thresholds.selection.proposals.all_joints.delays)
