@@ -10,6 +10,7 @@ import numpy as np
 from bumblebee.diagnosis.simulation import Plant
 from bumblebee.diagnosis.thresholds.plan import SafetyMargins
 from bumblebee.sim.effects import Effect
+from bumblebee.sim.nearness import touching_from
 
 _NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 _NO_SERVOS = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
@@ -30,11 +31,10 @@ class Surroundings:
     """
 
     def __init__(self, plant: Plant, rest: np.ndarray, rule: SafetyMargins, effects: Sequence[Effect] = ()) -> None:
-        self.model = copy.copy(plant.model)
+        self.model = touching_from(plant.model, max(rule.clearance, rule.touch))
         self.rule, self._floating = rule, plant.floating
         awake = (self.model.geom_contype | self.model.geom_conaffinity) != 0
         self.model.geom_contype[awake], self.model.geom_conaffinity[awake] = 1, 1
-        self.model.geom_margin[:] = max(rule.clearance, rule.touch)
         self.model.opt.disableflags &= ~_NO_CONTACTS
         self._data = mujoco.MjData(self.model)
         self.has_geometry = bool((awake & (self.model.body_weldid[self.model.geom_bodyid] != 0)).any())

@@ -1,6 +1,5 @@
 """Ground reaction of a robot whose base is free: any force and moment on each body that touches."""
 
-import copy
 from collections.abc import Sequence
 
 import mujoco
@@ -8,6 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.simulation import Plant
 from bumblebee.diagnosis.thresholds.sensitivities import Ground
+from bumblebee.sim.nearness import touching_from
 
 
 def pushes(plant: Plant, qpos: np.ndarray, rule: Ground) -> np.ndarray:
@@ -18,14 +18,14 @@ def pushes(plant: Plant, qpos: np.ndarray, rule: Ground) -> np.ndarray:
     model, shape = plant.model, qpos.shape[:2]
     if not plant.floating:
         return np.zeros((*shape, model.nv, 0))
-    near, data = _nearer(model, rule.touching), mujoco.MjData(model)
+    near, data = touching_from(model, rule.touching), mujoco.MjData(model)
     each = []
     for pose in qpos.reshape(-1, qpos.shape[-1]):
         data.qpos[:] = pose
         mujoco.mj_kinematics(near, data)
         mujoco.mj_comPos(near, data)
         mujoco.mj_collision(near, data)
-        each.append([_jacobian(model, data, body) for body in _touching(model, data)])
+        each.append([_jacobian(model, data, body) for body in _touching(model, data, rule.touching)])
     out = np.zeros((len(each), model.nv, 6 * max(len(rows) for rows in each)))
     for part, rows in zip(out, each, strict=True):
         for k, row in enumerate(rows):
@@ -55,16 +55,9 @@ def without(torques: np.ndarray, basis: np.ndarray) -> np.ndarray:
     return torques - basis @ (basis.transpose(0, 2, 1) @ torques) if basis.shape[-1] else torques
 
 
-def _nearer(model: mujoco.MjModel, margin: float) -> mujoco.MjModel:
-    """The model with geometries that touch from a distance [m] on."""
-    near = copy.copy(model)
-    near.geom_margin[:] = np.maximum(near.geom_margin, margin)
-    return near
-
-
-def _touching(model: mujoco.MjModel, data: mujoco.MjData) -> Sequence[int]:
-    """Bodies that touch what does not move."""
-    pairs = model.geom_bodyid[data.contact.geom]
+def _touching(model: mujoco.MjModel, data: mujoco.MjData, distance: float) -> Sequence[int]:
+    """Bodies that are nearer than a distance [m] to what does not move."""
+    pairs = model.geom_bodyid[data.contact.geom[data.contact.dist < distance]]
     still = model.body_weldid[pairs] == 0
     return sorted({int(b) for b in pairs[~still & still[:, ::-1]]})
 

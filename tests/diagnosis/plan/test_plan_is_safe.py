@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.plan import PlanConfig, make_plan, set_stage
-from bumblebee.diagnosis.plan.contacts import Surroundings, inner_radius, inside_by
+from bumblebee.diagnosis.plan.contacts import Clash, Surroundings, inner_radius, inside_by
 from bumblebee.diagnosis.plan.motions import draw_motion, smooth_step
 from bumblebee.diagnosis.plan.safety import made_safe
 from bumblebee.errors import BadInput
@@ -99,7 +99,8 @@ def test_runs_keep_clear_of_a_post_beside_the_arm() -> None:
     safe = made_safe(replace(stage, cases=stage.cases[:1]), motions, 0.005)
     assert any(near(model, follow(model, home, m.targets)[0]) <= 0 for m in motions)
     assert safe.motions
-    assert all(near(model, follow(model, home, m.targets)[0]) > 0.0 for m in safe.motions)
+    clear = 0.9 * LIMITS.thresholds.plan.safety.clearance  # at a step of this test's own
+    assert all(near(model, follow(model, home, m.targets)[0]) > clear for m in safe.motions)
 
 
 def near(model: mujoco.MjModel, path: np.ndarray) -> float:
@@ -143,6 +144,21 @@ def test_surroundings_tell_a_far_arm_from_a_near_one() -> None:
     away, into = np.zeros(3), np.array([0.0, 0.9, 0.0])
     assert around.clash(away[None], away[None], away[None]) is None
     assert "l3" in around.clash(into[None], away[None], away[None]).reason
+
+
+@pytest.mark.parametrize("more", ["", '<geom type="sphere" size=".01" mass="0"/>'], ids=["one", "two geometries"])
+def test_bodies_that_come_closer_than_the_clearance_are_refused_before_they_touch(more: str) -> None:
+    def clash(gap: float) -> Clash | None:
+        beside = BLOCKED.replace('pos=".35 0 1.2"', f'pos="{0.04 + gap + 0.05} 0 1.2"')
+        spec = mujoco.MjSpec.from_string(beside.replace('<geom name="tip"', f'{more}<geom name="tip"'))
+        stage = set_stage(spec, "arm", LIMITS, None, None)
+        around = Surroundings(stage.machine.plant, np.array([0.0, -0.5, 0.0]), LIMITS.thresholds.plan.safety)
+        upright = np.zeros((1, 3))
+        return around.clash(upright, upright, upright)
+
+    refused = clash(0.005)
+    assert refused and refused.reason == "l3 and world come closer than 10 mm"
+    assert clash(0.012) is None
 
 
 def test_the_margin_of_support_is_the_distance_from_the_edge() -> None:

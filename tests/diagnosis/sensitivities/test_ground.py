@@ -27,6 +27,8 @@ def test_a_trunk_on_its_feet_may_be_pushed_and_one_in_the_air_may_not(session: S
     assert ground.shape == (1, 2, 7, 6)
     assert np.linalg.matrix_rank(ground[0, 0]) == 6 and not ground[0, 1].any()
     assert pushes(session.plant, _poses(session, 0.5), Ground()).shape[-1] == 0
+    assert pushes(session.plant, _poses(session, 0.23), Ground()).shape[-1] == 0
+    assert pushes(session.plant, _poses(session, 0.23), Ground(touching=0.04)).shape[-1] == 6
 
 
 def test_an_arm_that_is_bolted_down_is_not_pushed() -> None:

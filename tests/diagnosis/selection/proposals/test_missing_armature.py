@@ -45,3 +45,17 @@ def test_gains_that_are_far_off_stay_gains(windows: int) -> None:
         assert found["motor_strength", joint] == pytest.approx(1 / 30, rel=0.05)
         assert found["viscous_friction", joint] == pytest.approx(2 / 3 * damping, rel=0.1)
     assert "armature" not in {effect for effect, _ in found} and run.power() < 2.0
+
+
+def test_rotors_beside_half_the_damping_are_found() -> None:
+    """Beside a kd that is too large friction cannot be less than none, and drives are at their limits at times."""
+    damped = {("viscous_friction", joint): value for joint, value in zip(arm.JOINTS, (0.8, 1.0, 0.5), strict=True)}
+    dry = {("coulomb_friction", joint): value for joint, value in zip(arm.JOINTS, (1.2, 2.0, 0.8), strict=True)}
+    rotors = {("armature", joint): value for joint, value in zip(arm.JOINTS, (0.5, 0.6, 0.3), strict=True)}
+    drawn = re.sub(r'armature="[.0-9]+"', 'armature="0"', arm.XML)
+    declared = re.sub(r'kv="(\d+)"', lambda m: f'kv="{2 * int(m[1])}"', drawn)
+    run = begun({**damped, **dry, **rotors}, declared, 40)
+    assert go(run, partial(start_far_off, tried=[])) and run.power() < 30.0
+    found = {(c.effect, c.where): float(run.fit.of(c)[0]) for c in run.fit.chosen}
+    for place, rotor in rotors.items():
+        assert found[place] == pytest.approx(rotor, rel=0.1), place

@@ -5,7 +5,7 @@ from functools import partial, reduce
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate, effects_at
+from bumblebee.diagnosis.candidates import Candidate, absent, effects_at
 from bumblebee.diagnosis.comparison import drop_unsure
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, levenberg_marquardt, typical_power
 from bumblebee.diagnosis.residuals import Problem, screening_windows, window_weights
@@ -13,6 +13,8 @@ from bumblebee.diagnosis.selection.proposals.all_joints.held_joints import held_
 from bumblebee.diagnosis.selection.proposals.all_joints.loads import with_loads
 from bumblebee.diagnosis.selection.proposals.all_joints.standard_parameters import Begun
 from bumblebee.diagnosis.selection.proposals.all_joints.sure import sure_by_misfit, sure_of
+from bumblebee.effects.kind import Kind
+from bumblebee.sim.effects import CATALOGUE
 
 
 def simulated(problem: Problem, several: Sequence[Begun]) -> Fit:
@@ -35,10 +37,14 @@ def sure_on_the_ground(
     """Effects of a robot whose base is free, and its loads, that are sure together; None where nothing is.
 
     A step of a G1's fit takes ten to twenty seconds of one core: they are taken from the nearest beginning alone, on
-    some of the windows, and what is not sure is taken out as far as the simulator bears it out.
+    some of the windows, and what is not sure is taken out as far as the simulator bears it out. What every joint has
+    and no torque stands for, the offset of its encoder, is beside it from none on.
     """
     some, rule = _some(problem), problem.thresholds.selection.proposals.all_joints
-    fit = with_loads(some, levenberg_marquardt(some, *_nearest(some, several), rule.steps), candidates)
+    chosen, values = _nearest(some, several)
+    unseen = [c for c in candidates if c.where and _is_unseen(CATALOGUE[c.effect])]
+    begun = (*chosen, *unseen), np.concatenate((values, absent(unseen)))
+    fit = with_loads(some, levenberg_marquardt(some, *begun, rule.steps), candidates)
     say(f"{len(fit.chosen)} standard parameters and loads together: chi-square {fit.power(some):.3g}")
     chosen, values = held_by_dry_friction(some, fit)
     if len(chosen) < len(fit.chosen):
@@ -59,6 +65,10 @@ def sure_among(problem: Problem, fit: Fit) -> Fit | None:
 def is_fixed(problem: Problem) -> bool:
     """Whether no ground pushes back."""
     return not problem.plant.floating
+
+
+def _is_unseen(kind: Kind) -> bool:
+    return kind.usual == "joint" and kind.column == "simulated"
 
 
 def _some(problem: Problem) -> Problem:

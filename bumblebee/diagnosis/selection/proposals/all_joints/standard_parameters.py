@@ -1,4 +1,4 @@
-"""Standard parameters by linear regression on inverse dynamics: where a fit of a robot on a fixed base begins.
+"""Standard parameters by linear regression on inverse dynamics: where a fit of a robot far from its model begins.
 
 Far from the data a simulation of the declared model flies, and what holds it back wins: no strength at all, or friction
 beyond all measure. On the measured motion torques are linear in the standard parameters (Atkeson, An and Hollerbach
@@ -38,7 +38,7 @@ _GAIN = "kd"
 
 
 def standard_parameters(problem: Problem, candidates: Sequence[Candidate], level: float) -> list[Begun]:
-    """Effects and values of regressions on the fitted windows: every joint's alone, beside drives', beside links'.
+    """Effects and values of regressions on the fitted windows, of each set that `_sets` names.
 
     Each at no delay, and at the likeliest. False alarms of what comes in one after the other are held to `level`.
     Without any drive nothing says how heavy the links are. Empty where no joint moves.

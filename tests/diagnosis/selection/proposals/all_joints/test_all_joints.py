@@ -71,6 +71,17 @@ def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None
     assert pays(problem, Holdout(), declared, fit) and not pays(problem, Holdout(), fit, declared)
 
 
+def test_offsets_of_all_encoders_are_found_beside_them() -> None:
+    """No torque stands for an offset: the regression says nothing of it, and the rest cannot make up for all."""
+    offsets = {("encoder_offset", j): v for j, v in zip(arm.JOINTS, (0.05, -0.06, 0.08), strict=True)}
+    session, problem, _ = _opened({**TRUTH, **offsets})
+    fit = _fit_of(session, problem)
+    assert fit is not None
+    found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
+    for joint in arm.JOINTS[1:]:  # the first turns about the vertical: nothing tells where it is
+        assert found["encoder_offset", joint] == pytest.approx(offsets["encoder_offset", joint], abs=0.01), joint
+
+
 def test_without_candidates_nothing_begins() -> None:
     _, problem, _ = _opened({})
     assert standard_parameters(problem, [], SearchConfig().level) == []
