@@ -35,6 +35,7 @@ class Surroundings:
         self.rule, self._floating = rule, plant.floating
         awake = (self.model.geom_contype | self.model.geom_conaffinity) != 0
         self.model.geom_contype[awake], self.model.geom_conaffinity[awake] = 1, 1
+        self.model.body_contype[:], self.model.body_conaffinity[:] = 1, 1  # bodies that no geometry wakes are left out
         self.model.opt.disableflags &= ~_NO_CONTACTS
         self._data = mujoco.MjData(self.model)
         self.has_geometry = bool((awake & (self.model.body_weldid[self.model.geom_bodyid] != 0)).any())

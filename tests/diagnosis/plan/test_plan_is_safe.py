@@ -146,12 +146,15 @@ def test_surroundings_tell_a_far_arm_from_a_near_one() -> None:
     assert "l3" in around.clash(into[None], away[None], away[None]).reason
 
 
-@pytest.mark.parametrize("more", ["", '<geom type="sphere" size=".01" mass="0"/>'], ids=["one", "two geometries"])
-def test_bodies_that_come_closer_than_the_clearance_are_refused_before_they_touch(more: str) -> None:
+@pytest.mark.parametrize("tip", ["", '<geom type="sphere" size=".01" mass="0"/>'], ids=["one", "two geometries"])
+@pytest.mark.parametrize("kinds", ["", 'contype="0" conaffinity="1"'], ids=["awake", "for the floor alone"])
+def test_bodies_that_come_closer_than_the_clearance_are_refused_before_they_touch(tip: str, kinds: str) -> None:
+    """Also where the model lets the robot touch the floor alone, and on bodies of several geometries."""
+
     def clash(gap: float) -> Clash | None:
         beside = BLOCKED.replace('pos=".35 0 1.2"', f'pos="{0.04 + gap + 0.05} 0 1.2"')
-        spec = mujoco.MjSpec.from_string(beside.replace('<geom name="tip"', f'{more}<geom name="tip"'))
-        stage = set_stage(spec, "arm", LIMITS, None, None)
+        beside = beside.replace('<geom name="tip"', f'{tip}<geom name="tip"').replace("<geom ", f"<geom {kinds} ")
+        stage = set_stage(mujoco.MjSpec.from_string(beside), "arm", LIMITS, None, None)
         around = Surroundings(stage.machine.plant, np.array([0.0, -0.5, 0.0]), LIMITS.thresholds.plan.safety)
         upright = np.zeros((1, 3))
         return around.clash(upright, upright, upright)

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp
 
 from bumblebee.diagnosis.thresholds.proposals import PacketLoss
 
@@ -26,15 +25,17 @@ class LossLikelihoods:
 
     def total(self, share: float) -> float:
         """Log-likelihood of a share, summed over windows."""
-        return float(logsumexp(self.logs + self._prior(share), axis=1).sum())
+        posterior = self.logs + self._prior(share)
+        most = posterior.max(axis=1)
+        return float((most + np.log(np.exp(posterior - most[:, None]).sum(axis=1))).sum())
 
     @cached_property
     def best(self) -> float:
         """The share of largest likelihood, by expectation and maximisation."""
-        lost, share = self.patterns.sum(axis=1), self.rule.first_share
+        share = self.rule.first_share
         for _ in range(self.rule.iterations):
             before, weights = share, self._weights(share)
-            share = float(np.clip((weights @ lost).mean() / self.patterns.shape[1], 1e-6, 0.9))
+            share = float(np.clip((weights @ self._lost).mean() / self.patterns.shape[1], 1e-6, 0.9))
             if share == before:
                 break
         return share
@@ -54,10 +55,14 @@ class LossLikelihoods:
         which = np.argmax(self.logs + self._prior(share), axis=1)
         return -float(self._prior(share)[which].sum())
 
+    @cached_property
+    def _lost(self) -> np.ndarray:
+        return self.patterns.sum(axis=1)
+
     def _prior(self, share: float) -> np.ndarray:
-        lost = self.patterns.sum(axis=1)
-        return lost * np.log(share) + (self.patterns.shape[1] - lost) * np.log1p(-share)
+        return self._lost * np.log(share) + (self.patterns.shape[1] - self._lost) * np.log1p(-share)
 
     def _weights(self, share: float) -> np.ndarray:
         posterior = self.logs + self._prior(share)
-        return np.exp(posterior - logsumexp(posterior, axis=1, keepdims=True))
+        weights = np.exp(posterior - posterior.max(axis=1, keepdims=True))
+        return weights / weights.sum(axis=1, keepdims=True)
