@@ -13,6 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from bumblebee.effects.bare import bare_tendon
 from bumblebee.effects.hinges import joint_of
 from bumblebee.effects.kind import Kind, Parameter
 from bumblebee.effects.law import OF_ONE_JOINT
@@ -45,7 +46,7 @@ class Coupled(Kind, ABC):
         *sizes, ratio = values
         before = _before_in(spec, place)
         for way, size in zip(self.ways, sizes, strict=True):
-            tendon = spec.add_tendon(name=self._tendon(place, way))
+            tendon = bare_tendon(spec, name=self._tendon(place, way))
             tendon.wrap_joint(before, way * ratio)
             tendon.wrap_joint(place, 1.0)
             self.give(tendon, size)

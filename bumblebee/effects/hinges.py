@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.effects import native
+from bumblebee.effects.bare import bare_joint, bare_tendon
 from bumblebee.errors import BadInput
 
 _LEAST_GAP = 1e-9  # [rad]: MuJoCo takes no range of no width
@@ -49,7 +50,7 @@ def _second_hinge(spec: mujoco.MjSpec, name: str, kind: str, encoder: float) -> 
     keys = [(np.insert(k.qpos, at_q, 0.0), np.insert(k.qvel, at_v, 0.0)) for k in _filled_keys(spec, declared)]
     if encoder:
         body = _rotor(joint, native.rotor_of(kind, name))
-    hinge = body.add_joint(name=name + native.SUFFIX[kind], type=joint.type, axis=joint.axis, pos=joint.pos)
+    hinge = bare_joint(body, name=name + native.SUFFIX[kind], type=joint.type, axis=joint.axis, pos=joint.pos)
     hinge.armature = native.HIDDEN_ARMATURE
     if encoder:
         _explicit(spec)
@@ -73,7 +74,7 @@ def _explicit(spec: mujoco.MjSpec) -> None:
 
 def _along_both(spec: mujoco.MjSpec, name: str, one: str, other: str, inertia: float) -> None:
     """Inertia [kg m^2] that turns by the sum of two joints' angles."""
-    tendon = spec.add_tendon(name=name, armature=inertia)
+    tendon = bare_tendon(spec, name=name, armature=inertia)
     tendon.wrap_joint(one, 1.0)
     tendon.wrap_joint(other, 1.0)
 

@@ -16,6 +16,7 @@ STICTION_SOLREF = (0.004, 1.0)
 STICTION_SOLIMP = 0.99
 # The solver needs this many iterations to hold several stuck joints and contacts at once.
 STICTION_ITERATIONS = 20
+_FROM_GEOMETRIES, _WHERE_NONE_IS_STATED = 1, 2  # of `inertiafromgeom`
 
 
 def drives_of(spec: mujoco.MjSpec, joint: str) -> list[Any]:
@@ -43,8 +44,10 @@ def scale_gains(spec: mujoco.MjSpec, joint: str, kp: float, kd: float) -> None:
 
 def scale_gains_in_place(spot: Spot, kp: float, kd: float) -> None:
     """`scale_gains` of a compiled model."""
-    spot.model.actuator_gainprm[spot.actuator, 0] *= kp
-    spot.model.actuator_biasprm[spot.actuator, :3] *= [kp, kp, kd]
+    model = spot.model
+    servos = np.isin(model.actuator_trntype, ON_JOINT) & (model.actuator_trnid[:, 0] == spot.joint)
+    model.actuator_gainprm[servos, 0] *= kp
+    model.actuator_biasprm[servos, :3] *= [kp, kp, kd]
 
 
 def stick(spec: mujoco.MjSpec, name: str) -> None:
@@ -79,14 +82,23 @@ def body_of(spec: mujoco.MjSpec, name: str) -> Any:
     body = spec.body(name)
     if body is None:
         raise BadInput(f"effect on body {name!r}", "a body of the model", "no body of this name")
-    if not body.explicitinertial or np.isfinite(body.fullinertia[0]):
+    if spec.compiler.inertiafromgeom == _FROM_GEOMETRIES or spec.compiler.settotalmass > 0:
         declared = spec.compile()
-        index = declared.body(name).id
-        body.mass = declared.body_mass[index]
-        body.ipos, body.iquat = declared.body_ipos[index].copy(), declared.body_iquat[index].copy()
-        body.fullinertia = np.full(6, np.nan)
-        body.inertia, body.explicitinertial = declared.body_inertia[index].copy(), True
+        for other in spec.bodies[1:]:
+            _state_inertia(other, declared)
+        spec.compiler.inertiafromgeom, spec.compiler.settotalmass = _WHERE_NONE_IS_STATED, -1
+    elif not body.explicitinertial or np.isfinite(body.fullinertia[0]):
+        _state_inertia(body, spec.compile())
     return body
+
+
+def _state_inertia(body: Any, declared: mujoco.MjModel) -> None:
+    """Write the compiled mass, centre and principal moments of a body into it."""
+    index = declared.body(body.name).id if body.name else body.id
+    body.mass = declared.body_mass[index]
+    body.ipos, body.iquat = declared.body_ipos[index].copy(), declared.body_iquat[index].copy()
+    body.fullinertia = np.full(6, np.nan)
+    body.inertia, body.explicitinertial = declared.body_inertia[index].copy(), True
 
 
 def ground_of(spec: mujoco.MjSpec, name: str) -> tuple[Any, list[Any]]:

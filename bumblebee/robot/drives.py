@@ -132,3 +132,9 @@ def _force_ranges(a: mujoco.MjsActuator, joint: mujoco.MjsJoint, model: mujoco.M
     if takes_force and model.actuator_ctrllimited[a.id]:
         ranges.append(np.sort(a.gainprm[0] * model.actuator_ctrlrange[a.id]))
     return ranges
+
+
+def force_limit(model: mujoco.MjModel, actuator: int) -> float:
+    """Largest force [N m, N] that an actuator's range allows both ways; of a range to one side that side's."""
+    low, high = model.actuator_forcerange[actuator]
+    return float(min(-low, high) if low < 0 < high else max(-low, high))

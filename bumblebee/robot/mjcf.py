@@ -141,8 +141,8 @@ def _joint(path: Path, model: mujoco.MjModel, body: int) -> dict[str, Any] | Non
         "motor": "as in the model",
     }
     for key, value in (
-        ("armature", model.dof_armature[dof]),
-        ("damping", model.dof_damping[dof]),
+        ("armature", model.dof_armature[dof] + _of_motors(model, first, model.actuator_armature)),
+        ("damping", model.dof_damping[dof] + _of_motors(model, first, model.actuator_damping)),
         ("frictionloss", model.dof_frictionloss[dof]),
     ):
         if value > 0:
@@ -152,7 +152,7 @@ def _joint(path: Path, model: mujoco.MjModel, body: int) -> dict[str, Any] | Non
 
 def _drive(path: Path, model: mujoco.MjModel, joint: int) -> dict[str, float]:
     """Torque limit and servo gains of the actuator on a joint, at the joint, as far as the model says them."""
-    own = [a for a in range(model.nu) if model.actuator_trntype[a] in ON_JOINT and model.actuator_trnid[a, 0] == joint]
+    own = _motors(model, joint)
     if len(own) > 1:
         raise BadInput(f"{path}: {model.joint(joint).name}", "one drive", f"{len(own)} actuators")
     found: dict[str, float] = {}
@@ -164,6 +164,15 @@ def _drive(path: Path, model: mujoco.MjModel, joint: int) -> dict[str, float]:
             found["kp"] = -(gear**2) * float(model.actuator_biasprm[actuator, 1])
             found["kd"] = -(gear**2) * float(model.actuator_biasprm[actuator, 2])
     return found
+
+
+def _motors(model: mujoco.MjModel, joint: int) -> list[int]:
+    return [a for a in range(model.nu) if model.actuator_trntype[a] in ON_JOINT and model.actuator_trnid[a, 0] == joint]
+
+
+def _of_motors(model: mujoco.MjModel, joint: int, each: np.ndarray) -> float:
+    """At the joint, an inertia or a damping that motors have (nu,)."""
+    return float(sum(model.actuator_gear[a, 0] ** 2 * each[a] for a in _motors(model, joint)))
 
 
 def _shapes(model: mujoco.MjModel, body: int, name: str, meshed: bool) -> list[dict[str, Any]]:

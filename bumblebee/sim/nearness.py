@@ -1,8 +1,9 @@
-"""Geometries that touch from a distance on."""
+"""Geometries that can touch, and from what distance on."""
 
 import copy
 
 import mujoco
+import numpy as np
 
 
 def touching_from(model: mujoco.MjModel, distance: float) -> mujoco.MjModel:
@@ -15,3 +16,9 @@ def touching_from(model: mujoco.MjModel, distance: float) -> mujoco.MjModel:
     near.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
     near.opt.o_margin = distance
     return near
+
+
+def colliding(model: mujoco.MjModel) -> np.ndarray:
+    """(ngeom,) bool: geometries that can touch some other, by their masks or by a pair that the model names."""
+    named = np.isin(np.arange(model.ngeom), (model.pair_geom1, model.pair_geom2))
+    return (model.geom_contype | model.geom_conaffinity != 0) | named

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from bumblebee.robot.drives import ON_JOINT
+from bumblebee.robot.drives import ON_JOINT, force_limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Servos:
     bias: np.ndarray
     """(..., J, 3) torque: constant, for a unit of position, for a unit of velocity."""
     limit: np.ndarray
-    """(..., J) largest torque [N m]; infinite for none."""
+    """(..., J) largest torque both ways [N m]; infinite for none."""
     supply: np.ndarray | float = 1.0
     """(..., 1) supply voltage as a share of that at which a speed leaves no torque."""
 
@@ -66,7 +66,7 @@ def servos_of(model: mujoco.MjModel, joints: list[int]) -> Servos:
         bias = gear[:, None] * model.actuator_biasprm[a, :3]
         bias[:, 1:] *= gear[:, None]
         limited = has & (model.actuator_forcelimited[a] != 0)
-        limit = np.where(limited, np.abs(gear) * model.actuator_forcerange[a, 1], np.inf)
+        limit = np.where(limited, np.abs(gear) * np.array([force_limit(model, k) for k in a]), np.inf)
     return Servos(
         actuator=actuator,
         qpos=model.jnt_qposadr[joints].astype(int),

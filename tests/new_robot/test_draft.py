@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -53,6 +54,18 @@ def test_what_the_model_does_not_tell_is_asked(tmp_path: Path) -> None:
     without = drafted(tmp_path, mjcf(**{'<joint armature="0.02"/>': "<joint/>"}))
     assert without.said["motors"]["every"] == {"velocity_limit": 20.0, "armature": None}
     assert without.asked[0].startswith("motors: armature, which the model does not say")
+
+
+def test_a_rotor_that_the_motor_has_is_the_joints(tmp_path: Path) -> None:
+    made(tmp_path)
+    own = bodies_of(tmp_path / "plain.xml")["l_shin"]["joint"]
+    spec = mujoco.MjSpec.from_file(str(tmp_path / "plain.xml"))
+    motor = next(a for a in spec.actuators if a.target == own["name"])
+    motor.gear, motor.armature, motor.damping = [10.0, *motor.gear[1:]], 0.0005, [0.002, 0.0, 0.0]
+    (tmp_path / "geared.xml").write_text(spec.to_xml())
+    geared = bodies_of(tmp_path / "geared.xml")["l_shin"]["joint"]
+    assert geared["armature"] == pytest.approx(own["armature"] + 0.05)
+    assert geared["damping"] == pytest.approx(own.get("damping", 0.0) + 0.2)
 
 
 def test_a_keyframe_named_after_a_stand_is_the_stand(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from bumblebee.diagnosis.simulation import Plant
 from bumblebee.diagnosis.thresholds.plan import SafetyMargins
 from bumblebee.sim.effects import Effect
-from bumblebee.sim.nearness import touching_from
+from bumblebee.sim.nearness import colliding, touching_from
 
 _NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 _NO_SERVOS = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
@@ -33,7 +33,7 @@ class Surroundings:
     def __init__(self, plant: Plant, rest: np.ndarray, rule: SafetyMargins, effects: Sequence[Effect] = ()) -> None:
         self.model = touching_from(plant.model, max(rule.clearance, rule.touch))
         self.rule, self._floating = rule, plant.floating
-        awake = (self.model.geom_contype | self.model.geom_conaffinity) != 0
+        awake = colliding(self.model)
         self.model.geom_contype[awake], self.model.geom_conaffinity[awake] = 1, 1
         self.model.body_contype[:], self.model.body_conaffinity[:] = 1, 1  # bodies that no geometry wakes are left out
         self.model.opt.disableflags &= ~_NO_CONTACTS

@@ -87,6 +87,7 @@ def make_machine(spec: mujoco.MjSpec, name: str, session: Session | None, config
     plant = driven[Gain()]
     if (plant.actuator < 0).all():
         raise BadInput(name, "a model with a drive on a hinge or slide", "none", "Add its actuators.")
+    _refuse_untold(plant, name)
     seen_layout = session.layout if session else layout_of(plant, plant.floating)
     fine, search = steps_of(1.0 / rate, float(spec.option.timestep), plant.model.nv, rules.dataset.time_steps)
     qpos, home = start_pose(plant, session, config.start, name)
@@ -106,6 +107,18 @@ def make_machine(spec: mujoco.MjSpec, name: str, session: Session | None, config
         kd=np.maximum(-servos.bias[:, 2], 0.0),
         tracked=torque,
     )
+
+
+def _refuse_untold(plant: Plant, name: str) -> None:
+    """`BadInput` for a drive whose torque does not follow from gains alone: no limit of a run could be promised."""
+    for joint, actuator, told in zip(plant.joints, plant.actuator, plant.scalable, strict=True):
+        if actuator >= 0 and not told:
+            raise BadInput(
+                f"{name}: joint {joint!r}",
+                "a drive whose torque follows from its gains",
+                "a dcmotor or pid actuator",
+                "Declare the position servo that it stands for.",
+            )
 
 
 def start_pose(plant: Plant, session: Session | None, start: str | None, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@
 input, position and velocity is the same question for all of them.
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -35,10 +36,12 @@ class DriveLaw:
 
 
 def drive_law(model: mujoco.MjModel, where: object, rule: DriveProbe) -> DriveLaw:
-    """Probe every actuator of `model`; `where` names it in the error for actuators of several inputs."""
+    """Probe every actuator of `model`, its ranges aside; `where` names it in errors for actuators of several inputs."""
     count = len(model.actuator_trntype)
     if model.nu != count:
         raise BadInput(where, "actuators of one input each", f"{count} actuators with {model.nu} inputs")
+    model = copy.copy(model)
+    model.actuator_ctrllimited[:], model.actuator_forcelimited[:] = 0, 0
     data = mujoco.MjData(model)
     gain, stiffness = np.zeros(count), np.zeros(count)
     fed = [int(model.actuator_actadr[a]) for a in range(count)]

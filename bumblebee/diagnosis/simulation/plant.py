@@ -35,6 +35,8 @@ _STATES = {
     int(mujoco.mjtDyn.mjDYN_INTEGRATOR): "integrates its command",
     int(mujoco.mjtDyn.mjDYN_MUSCLE): "is a muscle",
     int(mujoco.mjtDyn.mjDYN_USER): "has dynamics of a plugin",
+    int(mujoco.mjtDyn.mjDYN_PID): "sums up its error or limits its rate",
+    int(mujoco.mjtDyn.mjDYN_DCMOTOR): "has a current, an integral or a temperature of its own",
 }
 
 
@@ -253,7 +255,7 @@ def refuse_unlogged(plant: Plant, where: object) -> None:
                 f"one on {_PLACES.get(place, 'something else')}, for which there is no column",
                 "Take it out of the model, or drive the joints themselves.",
             )
-        if (kind := int(model.actuator_dyntype[a])) in _STATES:
+        if (kind := int(model.actuator_dyntype[a])) in _STATES and model.actuator_actnum[a]:
             raise BadInput(
                 f"{where}: actuator {name!r}",
                 "a motor, a servo or a dcmotor",

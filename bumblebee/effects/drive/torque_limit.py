@@ -10,6 +10,7 @@ from bumblebee.effects.kind import INF, Kind, Parameter
 from bumblebee.effects.law import TORQUE, Law, Rows
 from bumblebee.effects.mjcf import servos_of
 from bumblebee.effects.places import OnJoint, Spot, Step
+from bumblebee.robot.drives import force_limit
 
 
 def _rows(data: Any, j: int) -> Rows:
@@ -42,7 +43,7 @@ class TorqueLimit(Kind):
     def declared(self, spot: Spot) -> Sequence[float]:
         model, a = spot.model, spot.actuator
         limited = a >= 0 and model.actuator_forcelimited[a]
-        given = abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf
+        given = abs(model.actuator_gear[a, 0]) * force_limit(model, a) if limited else np.inf
         return (given / spot.supply,)
 
     def steps(self, on: OnJoint) -> Iterator[Step]:

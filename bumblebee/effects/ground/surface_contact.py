@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.effects import native
+from bumblebee.effects.bare import bare_pair
 from bumblebee.effects.kind import Kind, Parameter
 from bumblebee.effects.places import Spot
 from bumblebee.errors import BadInput
@@ -46,7 +47,7 @@ class SurfaceContact(Kind):
         body.add_geom(name=point, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, pos=at, mass=0, **silent)
         flat = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0, 0, 1], "pos": [0, 0, height]}
         spec.worldbody.add_geom(name=plane, **flat, **silent)
-        spec.add_pair(geomname1=point, geomname2=plane, condim=3, friction=[friction, friction, *_ROLLING])
+        bare_pair(spec, geomname1=point, geomname2=plane, condim=3, friction=[friction, friction, *_ROLLING])
 
     def write(self, spot: Spot, *values: float) -> None:
         model, (height, *at, friction) = spot.model, values

@@ -147,14 +147,21 @@ def test_surroundings_tell_a_far_arm_from_a_near_one() -> None:
 
 
 @pytest.mark.parametrize("tip", ["", '<geom type="sphere" size=".01" mass="0"/>'], ids=["one", "two geometries"])
-@pytest.mark.parametrize("kinds", ["", 'contype="0" conaffinity="1"'], ids=["awake", "for the floor alone"])
+@pytest.mark.parametrize(
+    "kinds",
+    ["", 'contype="0" conaffinity="1"', 'contype="0" conaffinity="0"'],
+    ids=["awake", "for the floor alone", "pair"],
+)
 def test_bodies_that_come_closer_than_the_clearance_are_refused_before_they_touch(tip: str, kinds: str) -> None:
-    """Also where the model lets the robot touch the floor alone, and on bodies of several geometries."""
+    """Also where the model lets the robot touch the floor alone, or by a named pair; on bodies of several shapes."""
 
     def clash(gap: float) -> Clash | None:
         beside = BLOCKED.replace('pos=".35 0 1.2"', f'pos="{0.04 + gap + 0.05} 0 1.2"')
         beside = beside.replace('<geom name="tip"', f'{tip}<geom name="tip"').replace("<geom ", f"<geom {kinds} ")
-        stage = set_stage(mujoco.MjSpec.from_string(beside), "arm", LIMITS, None, None)
+        pair = '<contact><pair geom1="tip" geom2="post"/></contact>'
+        stage = set_stage(
+            mujoco.MjSpec.from_string(beside.replace("<actuator>", f"{pair}<actuator>")), "arm", LIMITS, None, None
+        )
         around = Surroundings(stage.machine.plant, np.array([0.0, -0.5, 0.0]), LIMITS.thresholds.plan.safety)
         upright = np.zeros((1, 3))
         return around.clash(upright, upright, upright)
@@ -162,6 +169,21 @@ def test_bodies_that_come_closer_than_the_clearance_are_refused_before_they_touc
     refused = clash(0.005)
     assert refused and refused.reason == "l3 and world come closer than 10 mm"
     assert clash(0.012) is None
+
+
+def test_a_limit_is_what_the_drive_gives_both_ways() -> None:
+    lopsided = XML.replace('forcerange="-20 20"', 'forcerange="-5 20"')
+    stage = set_stage(mujoco.MjSpec.from_string(lopsided), "arm", LIMITS, None, None)
+    assert stage.limits.torque[2] == pytest.approx(LIMITS.thresholds.plan.safety.torque * 5.0)
+
+
+def test_a_drive_whose_torque_its_gains_do_not_tell_is_refused() -> None:
+    last = '<position name="j3" joint="j3" kp="30" kv="2" forcerange="-20 20"/>'
+    motor = '<dcmotor name="j3" joint="j3" motorconst=".5" resistance="1" input="pos" controller="40 0 2"/>'
+    assert last in XML
+    config = replace(LIMITS, torque={"j3": 20.0})
+    with pytest.raises(BadInput, match="joint 'j3'.*dcmotor or pid"):
+        set_stage(mujoco.MjSpec.from_string(XML.replace(last, motor)), "arm", config, None, None)
 
 
 def test_the_margin_of_support_is_the_distance_from_the_edge() -> None:

@@ -8,10 +8,12 @@ import pytest
 
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.residuals.imu_tilt import raised_by_tilt
+from bumblebee.diagnosis.simulation import make_plant
 from bumblebee.diagnosis.simulation.chunk import Chunk, Starts
 from bumblebee.diagnosis.simulation.starts.base_height import heights_of
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, cut
+from bumblebee.measured.rollout import Rollout
 from bumblebee.quaternions import from_rotation_vector, multiply
 from bumblebee.sim.effects import Effect, single
 from tests.diagnosis import stander
@@ -91,3 +93,17 @@ def test_heights_of_states_are_those_at_which_the_lowest_point_touches_the_floor
         mujoco.mj_forward(plant.model, data)
         balls = data.geom_xpos[plant.model.geom_type == int(mujoco.mjtGeom.mjGEOM_SPHERE)]
         assert balls[:, 2].min() == pytest.approx(0.02, abs=1e-9)
+
+
+def test_feet_that_touch_by_a_named_pair_alone_are_feet() -> None:
+    paired = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1" contype="0" conaffinity="0"/>
+<body name="trunk"><freejoint/><geom name="foot" type="sphere" size=".2" contype="0" conaffinity="0"/>
+<body><joint name="j"/><geom size=".05" contype="0" conaffinity="0"/></body></body></worldbody>
+<contact><pair geom1="foot" geom2="floor"/></contact></mujoco>"""
+    zeros, model = np.zeros((3, 1)), mujoco.MjSpec.from_string(paired)
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
+    base = {"base_quat": turn, "base_ang_vel": np.zeros((3, 3)), "base_lin_vel": np.zeros((3, 3))}
+    log = Rollout("run", ("j",), 50.0, np.arange(3) / 50, zeros, zeros, joint_target=zeros, **base)
+    plant = make_plant(model, log, "paired")
+    height = heights_of(plant, plant.model.qpos0[None])
+    assert height[0] + plant.thresholds.base_height.rest_depth == pytest.approx(0.2)

@@ -26,11 +26,20 @@ def rollout() -> Rollout:
         ('<position name="winch" tendon="cord" kp="5"/>', "'winch'.*tendon"),
         ('<motor name="jet" site="tip" gear="0 0 1 0 0 0"/>', "'jet'.*site"),
         ('<intvelocity name="creeper" joint="hinge" kp="20" actrange="-1 1"/>', "'creeper'.*integrates"),
+        ('<pid name="summer" joint="hinge" kp="4" ki="60" input="pos"/>', "'summer'.*sums up"),
+        ('<dcmotor name="coil" joint="hinge" motorconst=".5" resistance="1" inductance=".02"/>', "'coil'.*current"),
     ],
 )
 def test_an_actuator_that_the_log_says_nothing_of_is_named(actuator: str, named: str) -> None:
     with pytest.raises(BadInput, match=named):
         make_session(mujoco.MjSpec.from_string(ARM.format(actuator)), [rollout()], "arm.xml", "logs")
+
+
+def test_a_servo_stays_one_whose_commands_and_forces_have_ranges_without_zero() -> None:
+    """It was asked for its stiffness at a command of zero, which its range turned into one at its force limit."""
+    ranged = ARM.format("").replace('kp="20"', 'kp="2000" ctrlrange="-2.7 -.9" forcerange="-35 35"')
+    session = make_session(mujoco.MjSpec.from_string(ranged), [rollout()], "arm.xml", "logs")
+    assert not session.plant.torque_input and session.plant.scalable.all()
 
 
 @pytest.mark.parametrize("actuator", ["", '<general name="dead" tendon="cord" gainprm="0"/>'])

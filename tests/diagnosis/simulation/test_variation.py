@@ -52,3 +52,13 @@ def test_what_of_a_rotor_turns_with_the_link_is_taken_from_it(encoder: float, ar
     assert varied.dof_armature[made.joint(joint).dofadr[0]] == pytest.approx((1 - behind) * whole)
     again = vary(plant, [single("series_elasticity", joint, 300.0, encoder, 1e-3, 0.4), *effects[1:]]).model
     assert again.tendon_armature == pytest.approx([(0.6 if encoder else 0.4) * whole])  # the same structure, varied
+
+
+def test_a_weaker_drive_of_two_servos_is_weaker_in_both() -> None:
+    second = '<position name="again" joint="j3" kp="20" kv="1"/></actuator>'
+    spec = mujoco.MjSpec.from_string(arm.XML.replace("</actuator>", second))
+    plant = make_plant(spec, arm.simulate({}, count=1, seconds=1.0)[0], "arm")
+    weak = single("motor_strength", "j3", 0.5)
+    written = spec.copy()
+    add_to_spec(written, [weak])
+    np.testing.assert_array_equal(vary(plant, [weak]).model.actuator_gainprm, written.compile().actuator_gainprm)

@@ -7,6 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.nearness import colliding
 
 
 def stance_heights(plant: Plant, rollouts: Sequence[Rollout], ids: Iterable[int]) -> dict[int, np.ndarray]:
@@ -37,10 +38,7 @@ def heights_of(plant: Plant, qpos: np.ndarray) -> np.ndarray:
 
 def touches(model: mujoco.MjModel, geom: int) -> bool:
     """Whether a geometry moves and collides."""
-    return (
-        bool(model.geom_contype[geom] | model.geom_conaffinity[geom])
-        and model.body_weldid[model.geom_bodyid[geom]] != 0
-    )
+    return bool(colliding(model)[geom]) and model.body_weldid[model.geom_bodyid[geom]] != 0
 
 
 def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
