@@ -182,7 +182,7 @@ def test_a_drive_whose_torque_its_gains_do_not_tell_is_refused() -> None:
     motor = '<dcmotor name="j3" joint="j3" motorconst=".5" resistance="1" input="pos" controller="40 0 2"/>'
     assert last in XML
     config = replace(LIMITS, torque={"j3": 20.0})
-    with pytest.raises(BadInput, match="joint 'j3'.*dcmotor or pid"):
+    with pytest.raises(BadInput, match=r"joint 'j3'.*dcmotor or pid"):
         set_stage(mujoco.MjSpec.from_string(XML.replace(last, motor)), "arm", config, None, None)
 
 
