@@ -109,3 +109,8 @@ def ground_of(spec: mujoco.MjSpec, name: str) -> tuple[Any, list[Any]]:
     masks = (ground.contype, ground.conaffinity)
     others = [g for g in spec.geoms if g is not ground and native.touch(*masks, g.contype, g.conaffinity)]
     return ground, others
+
+
+def pairs_of(spec: mujoco.MjSpec, ground: str) -> list[Any]:
+    """Contact pairs that the model names of a geometry."""
+    return [pair for pair in spec.pairs if ground in (pair.geomname1, pair.geomname2)]

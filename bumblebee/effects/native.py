@@ -63,6 +63,11 @@ def touching(model: mujoco.MjModel, ground: int) -> list[int]:
     return [g for g, meet in pairs if meet and g != ground]
 
 
+def pairs_of(model: mujoco.MjModel, ground: int) -> np.ndarray:
+    """Contact pairs (K,) of the geometry `ground` that the model names, with a friction and softness of their own."""
+    return np.flatnonzero((model.pair_geom1 == ground) | (model.pair_geom2 == ground))
+
+
 def contact_names(body: str) -> tuple[str, str]:
     """Names of the geometries of a body's point and of the surface that it touches."""
     return f"{body}_contact_point", f"{body}_surface"

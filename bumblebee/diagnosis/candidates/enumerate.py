@@ -12,7 +12,7 @@ from bumblebee.diagnosis.candidates.surfaces import surface_candidates
 from bumblebee.diagnosis.simulation import Plant, declared_values, spot
 from bumblebee.diagnosis.thresholds.candidates import BodySteps, CandidateThresholds, StillJoints
 from bumblebee.effects.coupled import joint_before
-from bumblebee.effects.native import touching
+from bumblebee.effects.native import pairs_of, touching
 from bumblebee.effects.places import OnBody, OnJoint, OnRobot, Step
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import CATALOGUE, Kind
@@ -141,4 +141,5 @@ def _grounds(plant: Plant) -> list[str]:
     """Named geometries of the world that a moving body can touch."""
     model = plant.model
     fixed = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == 0]
-    return [model.geom(g).name for g in fixed if model.geom(g).name and touching(model, g)]
+    met = [g for g in fixed if touching(model, g) or len(pairs_of(model, g))]
+    return [model.geom(g).name for g in met if model.geom(g).name]
