@@ -89,12 +89,17 @@ def square(t: float) -> float:
     return (0.0, 0.5, 0.3, -0.2, 0.4)[min(int(t / 0.1 + 1e-9), 4)]
 
 
-def shaped(follow: Callable[[float, float, float], tuple[float, float]]) -> Callable[[float, float, float], float]:
-    """The servo's torque where its set-point y, of speed w, goes by `follow(y, w, target)` in a step of FINE."""
+def shaped(
+    follow: Callable[[float, float, float], tuple[float, float]], late: float = 0.0
+) -> Callable[[float, float, float], float]:
+    """The servo's torque where its set-point y, of speed w, goes by `follow(y, w, target)` in a step of FINE.
+
+    The target is `late` [s].
+    """
     state = [0.0, 0.0]
 
     def torque(t: float, q: float, v: float) -> float:
-        state[:] = follow(*state, square(t))
+        state[:] = follow(*state, square(max(t - late, 0.0)))
         return float(np.clip(KP * (state[0] - q) - KD * v, -LIMIT, LIMIT))
 
     return torque
@@ -119,6 +124,24 @@ SETPOINTS = {
 def test_a_servo_follows_its_set_point(kind: str) -> None:
     values, follow = SETPOINTS[kind]
     check([single(kind, "j", *values)], reference(shaped(follow)), share=0.03, target=square)
+
+
+@pytest.mark.parametrize("kind", SETPOINTS)
+def test_a_set_point_follows_a_late_command(kind: str) -> None:
+    values, follow = SETPOINTS[kind]
+    late = reference(shaped(follow, 0.0325))
+    check([single("command_delay", "j", 0.0325), single(kind, "j", *values)], late, share=0.03, target=square)
+
+
+def test_torque_lags_behind_a_late_command() -> None:
+    state = [0.0]
+
+    def torque(t: float, q: float, v: float) -> float:
+        wanted = np.clip(KP * (square(max(t - 0.0325, 0.0)) - q) - KD * v, -LIMIT, LIMIT)
+        state[0] += FINE * (wanted - state[0]) / 0.02
+        return state[0]
+
+    check([single("command_delay", "j", 0.0325), single("torque_lag", "j", 0.02)], reference(torque), target=square)
 
 
 def test_a_joint_has_one_set_point() -> None:

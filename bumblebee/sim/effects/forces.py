@@ -28,7 +28,7 @@ from mujoco.batch import Batch
 from bumblebee.effects.catalogue import CATALOGUE
 from bumblebee.effects.setpoints import advance
 from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints
-from bumblebee.sim.effects.memory import REMEMBERED, Memory, bent, history_length
+from bumblebee.sim.effects.memory import REMEMBERED, Memory, bent, history_length, steps_held_back
 from bumblebee.sim.effects.states import states_of
 from bumblebee.sim.servo import Servos, servos_of
 
@@ -50,6 +50,8 @@ class StepHooks:
         self._back = history_length(hooks, self._step)
         self._past_q = np.zeros((count, self._back, joints))
         self._past_v = np.zeros((count, self._back, joints))
+        self._held_back = steps_held_back(model, self.servos)
+        self._past_u = np.zeros((count, int(np.ceil(self._held_back.max(initial=0.0))), joints))
         self._kept = states_of(hooks.terms)
         self._states = np.zeros((count, len(self._kept)))
         self._bent = np.zeros((count, len(hooks.hysteresis)))
@@ -89,7 +91,7 @@ class StepHooks:
         if memory is not None and memory.position is not None and self._back > 0:
             self._past_q[ids], self._past_v[ids] = memory.position, memory.velocity
         control = self.servos.controls(self._bound["ctrl"])[ids]
-        self._setpoint[ids], self._pace[ids] = control, 0.0
+        self._setpoint[ids], self._pace[ids], self._past_u[ids] = control, 0.0, control[:, None]
         target = self.servos.given(control)
         for k, s in enumerate(self._kept):
             self._states[ids, k] = s.first(target[:, s.column])
@@ -137,6 +139,7 @@ class StepHooks:
         h, servos = self._h, self.servos
         q, v = self._readings()
         told = servos.controls(self._bound["ctrl"])
+        told = _aged(self._past_u, told, self._held_back) if self._past_u.shape[1] else told
         u = self._shaped(told) if self._shaping else told
         for k, s in enumerate(self._kept):
             self._states[:, k] = s.at(self._states[:, k], servos.given(u)[:, s.column], self._time, self._step)
@@ -272,13 +275,13 @@ class StepHooks:
         if not self._back:
             return q, v
         at = self._h.encoder_delay / self._step
-        low, share = np.floor(at).astype(int), at - np.floor(at)
-        columns = np.arange(len(at))
-        out = []
-        for past, present in ((self._past_q, q), (self._past_v, v)):
-            path = np.concatenate((past, present[:, None]), axis=1)
-            newer = path[:, self._back - low, columns]
-            older = path[:, np.maximum(self._back - low - 1, 0), columns]
-            out.append(newer + share * (older - newer))
-            past[:] = path[:, 1:]
-        return out[0], out[1]
+        return _aged(self._past_q, q, at), _aged(self._past_v, v, at)
+
+
+def _aged(past: np.ndarray, present: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """What was so many `steps` (J,) ago, (n, J), linear between them; the `past` (n, L, J) goes on by one step."""
+    back, low, columns = past.shape[1], np.floor(steps).astype(int), np.arange(len(steps))
+    path = np.concatenate((past, present[:, None]), axis=1)
+    newer, older = path[:, back - low, columns], path[:, np.maximum(back - low - 1, 0), columns]
+    past[:] = path[:, 1:]
+    return newer + (steps - low) * (older - newer)

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from bumblebee.sim.effects.hooks import RuntimeHooks
+from bumblebee.sim.servo import Servos
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +30,7 @@ class Memory:
 
 
 # What is carried from step to step: saved, and on a GPU kept in place. tests/test_forgotten.py finds what is missing.
-REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent", "setpoint", "pace")
+REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "past_u", "states", "bent", "setpoint", "pace")
 
 
 def bent(z: np.ndarray, path: np.ndarray, width: float) -> np.ndarray:
@@ -41,3 +43,12 @@ def history_length(hooks: RuntimeHooks, step: float) -> int:
     """L: how many steps of readings the longest encoder delay looks back."""
     longest = float(hooks.encoder_delay.max(initial=0.0))
     return int(np.ceil(longest / step - 1e-9)) + 1 if longest > 0 else 0
+
+
+def steps_held_back(model: mujoco.MjModel, servos: Servos) -> np.ndarray:
+    """(J,) physics steps by which MuJoCo's own buffers hold the servos' commands back, one at least; 0 without one."""
+    a = np.maximum(servos.actuator, 0)
+    if not model.nu:
+        return np.zeros(len(a))
+    has = (servos.actuator >= 0) & (model.actuator_history[a, 0] > 0)
+    return np.where(has, np.maximum(model.actuator_delay[a] / model.opt.timestep, 1.0), 0.0)
