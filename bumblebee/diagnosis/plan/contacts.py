@@ -44,7 +44,7 @@ class Surroundings:
         self._pushed.opt.disableflags |= _NO_SERVOS
         self._forces, self._dof = mujoco.MjData(self._pushed), plant.dof
         self._place(rest)
-        self._known = {_pair(c) for c in self._contacts()}
+        self._known = {_pair(c): c.dist - rule.touch for c in self._contacts()}
         self.feet = self._touching_world() if plant.floating else {}
         self._feet_at = {b: self._data.xpos[b, :2].copy() for b in self.feet}
         self._base = int(self.model.jnt_bodyid[self.model.dof_jntid[plant.base_dof]]) if plant.floating else 0
@@ -52,6 +52,21 @@ class Surroundings:
         self._surfaces = [self._surface(e) for e in effects if e.effect == "surface_contact"]
         points = [p for some in self.feet.values() for p in some]
         self.radius = inner_radius(np.array(points)) if points else 0.0
+
+    def weighing(self, other: mujoco.MjModel) -> "Surroundings":
+        """The same of a robot whose bodies weigh what those of another model do; of a fixed base none is asked."""
+        if not self._floating:
+            return self
+        heavy = copy.copy(self)
+        heavy.model, heavy._pushed = copy.copy(self.model), copy.copy(self._pushed)
+        for model in (heavy.model, heavy._pushed):
+            for body in (b for b in range(1, model.nbody) if model.body(b).name):
+                theirs = other.body(model.body(body).name).id
+                for field in ("body_mass", "body_ipos", "body_iquat", "body_inertia"):
+                    getattr(model, field)[body] = getattr(other, field)[theirs]
+            mujoco.mj_setConst(model, mujoco.MjData(model))
+        heavy._data, heavy._forces = mujoco.MjData(heavy.model), mujoco.MjData(heavy._pushed)
+        return heavy
 
     def clash(self, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> Clash | None:
         """The first thing wrong along states (n, nq), (n, nv) of joints that are driven with `torque` (n, J)."""
@@ -78,12 +93,14 @@ class Surroundings:
         model = self.model
         for c in self._contacts():
             one, other = (int(model.geom_bodyid[g]) for g in c.geom)
-            if c.dist >= self.rule.clearance or _pair(c) in self._known or self._adjacent(one, other):
+            rest = self._known.get(_pair(c), np.inf)
+            least = min(self.rule.clearance, rest)  # what is near at rest comes no nearer; what touches there may
+            if c.dist >= least or rest <= 0.0 or self._adjacent(one, other):
                 continue
             if {one, other} & set(self.feet) and 0 in (model.body_weldid[one], model.body_weldid[other]):
                 continue
             names = " and ".join(model.body(b).name or f"body {b}" for b in (one, other))
-            return Clash(f"{names} come closer than {1000 * self.rule.clearance:.0f} mm", (one, other))
+            return Clash(f"{names} come closer than {1000 * least:.0f} mm", (one, other))
         return None
 
     def _surface(self, effect: Effect) -> tuple[int, np.ndarray, float]:

@@ -37,35 +37,35 @@ class Finding:
         """Effect and place, in words."""
         return f"{self.found.effect.replace('_', ' ')} {self.where}".strip()
 
-    @property
-    def _first(self) -> str:
-        """Name of its first parameter."""
-        return CATALOGUE[self.found.effect].parameters[0].name
-
-    @property
-    def _change(self) -> tuple[float, float]:
-        """Value of the first parameter, and how far it is from the declared one."""
-        value = self.found.parameters[self._first]
-        return value, abs(value - (self.nominal.get(self._first) or 0.0))
+    def _change(self, parameter: str) -> tuple[float, float]:
+        """Value of a parameter, and how far it is from the declared one."""
+        value = self.found.parameters[parameter]
+        return value, abs(value - (self.nominal.get(parameter) or 0.0))
 
     def differs(self, other: Effect, share: float) -> bool:
-        """Whether an effect of this kind is another robot: its first parameter differs by more than that share."""
-        value, change = self._change
-        return abs(other.parameters[self._first] - value) > share * change
+        """Whether an effect of this kind is another robot: a parameter differs by more than that share."""
+        changes = {name: self._change(name) for name in self.found.parameters}
+        return any(abs(other.parameters[name] - value) > share * change for name, (value, change) in changes.items())
 
-    def ends(self, beyond: float) -> tuple[Effect, Effect]:
-        """The effect with its first parameter at either end of its interval.
+    def ends(self, beyond: float) -> list[tuple[str, Effect]]:
+        """The effect with one parameter at either end of its interval, and which.
 
-        An interval without an end: as far as `beyond` times the change from the declared value.
+        The first parameter's interval without an end: as far as `beyond` times the change from the declared value.
         """
-        first, (value, change) = CATALOGUE[self.found.effect].parameters[0], self._change
         ends = []
-        for side, sign in ((self.low, -1.0), (self.high, 1.0)):
-            end = side.get(first.name)
-            end = value + sign * (beyond - 1.0) * change if end is None else end
-            inside = float(np.clip(end, first.lower, first.upper))
-            ends.append(Effect(self.found.effect, self.found.where, {**self.found.parameters, first.name: inside}))
-        return ends[0], ends[1]
+        for k, parameter in enumerate(CATALOGUE[self.found.effect].parameters):
+            if parameter.name not in self.found.parameters:
+                continue
+            value, change = self._change(parameter.name)
+            for name, side, sign in (("lower", self.low, -1.0), ("upper", self.high, 1.0)):
+                end = side.get(parameter.name)
+                if end is None and k:
+                    continue
+                end = value + sign * (beyond - 1.0) * change if end is None else end
+                inside = float(np.clip(end, parameter.lower, parameter.upper))
+                changed = Effect(self.found.effect, self.found.where, {**self.found.parameters, parameter.name: inside})
+                ends.append((f"{name} end of its {'interval' if not k else parameter.name}", changed))
+        return ends
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,6 +62,8 @@ def _travel(
     low = np.where(limited, model.jnt_range[ids, 0], -np.inf)
     high = np.where(limited, model.jnt_range[ids, 1], np.inf)
     said = ["the model's ranges"] if limited.any() else []
+    inside = np.where(limited, rule.travel * (model.jnt_range[ids, 1] - model.jnt_range[ids, 0]), 0.0)
+    low, high = low + inside, high - inside
     asked = given(names, config.travel, "--travel")
     told = np.isfinite(asked)
     if told.any():
@@ -75,9 +77,7 @@ def _travel(
         high = np.where(~free, high, np.maximum(seen.max(axis=0), machine.home))
         said.append("the range that the dataset covers")
     _require(machine, np.isfinite(low) & np.isfinite(high), "a range in the model", "--travel")
-    inside = np.where(np.isfinite(high - low), rule.travel * (high - low), 0.0)
-    only = limited & ~told  # what was asked for is already apart from the stops
-    return low + inside * only, high - inside * only, ", ".join(said)
+    return low, high, ", ".join(said)
 
 
 def _speed(machine: Machine, session: Session | None, config: PlanConfig) -> tuple[np.ndarray, str]:

@@ -14,7 +14,7 @@ from bumblebee.diagnosis.plan.limits import limits_of
 from bumblebee.diagnosis.plan.machine import Machine, make_machine, without_gains
 from bumblebee.diagnosis.plan.motions import FAMILIES, Motion, Scope, draw_motion
 from bumblebee.diagnosis.plan.rehearsal import rehearse, settled
-from bumblebee.diagnosis.plan.safety import LATE, Safe, judge, made_safe
+from bumblebee.diagnosis.plan.safety import LATE, Safe, judge, made_safe, weighed
 from bumblebee.diagnosis.plan.stage import Stage
 from bumblebee.diagnosis.plan.unknowns import Case, cases_of
 from bumblebee.errors import BadInput
@@ -117,13 +117,16 @@ def _holding(machine: Machine) -> np.ndarray:
 
 
 def resting(stage: Stage, cases: list[Case]) -> Stage:
-    """The stage with those of the cases that rest in the start pose within all limits, at every gain.
+    """The stage with those of the cases that rest in the start pose within all limits, at every gain that is left.
 
-    Gains other than the declared ones at which one that must does not are left out, and so are cases that need not;
-    their names are kept. `BadInput` for one that must at the declared gains.
+    Cases that do not at the declared gains are left out, `BadInput` for one that must; and so are other gains at which
+    one of the rest does not: the robot may be that one. Names of both are kept.
     """
-    restless = dict(stage.restless)
-    for case in (case for case in cases if case.must):
+    restless, out = dict(stage.restless), dict(stage.left_out)
+    for case in cases:
+        if not case.must and _unrest(stage, case, Gain()):
+            out[case.name] = "does not even rest in the start pose"
+            continue
         for gain in (gain for gain in stage.machine.driven if str(gain) not in restless):
             if found := _unrest(stage, case, gain):
                 if gain == Gain():
@@ -135,10 +138,6 @@ def resting(stage: Stage, cases: list[Case]) -> Stage:
                     )
                 restless[str(gain)] = f"{case.name}: {found}"
     stage = replace(stage, machine=without_gains(stage.machine, restless), restless=restless)
-    out = dict(stage.left_out)
-    for case in (case for case in cases if not case.must):
-        if any(_unrest(stage, case, gain) for gain in stage.machine.driven):
-            out[case.name] = "does not even rest in the start pose"
     return replace(stage, cases=[case for case in cases if case.name not in out], left_out=out)
 
 
@@ -148,7 +147,7 @@ def _unrest(stage: Stage, case: Case, gain: Gain) -> str:
     still, ones = np.zeros((max(2, round(machine.rate)), len(machine.home))), np.ones(len(machine.home))
     hold = Motion(0, "holds", "", gain, machine.home, still, ones)
     runs = rehearse(machine, [hold], case.effects, stage.step, stage.rules.motions.settle)
-    return judge(stage, runs, [hold])[0].reason
+    return judge(weighed(stage, case), runs, [hold])[0].reason
 
 
 def _supporting(machine: Machine, around: Surroundings) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Runs simulated whole, under the declared model with some effects."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.machine import Machine, at_rest
 from bumblebee.diagnosis.plan.motions import Motion
-from bumblebee.diagnosis.simulation import Layout, Plant, Variation, cut, residuals, vary
+from bumblebee.diagnosis.simulation import Layout, Plant, Variation, Windows, cut, residuals, vary
 from bumblebee.measured.rollout import Rollout
 from bumblebee.quaternions import conjugate, from_rotation_vector, rotate
 from bumblebee.sim.effects import Effect
@@ -21,7 +21,7 @@ _TOGETHER = 16  # runs simulated at once: memory
 
 @dataclass(frozen=True, eq=False)
 class Rehearsed:
-    """R runs of T ticks, on the joints J; NaN from where a simulation diverged."""
+    """R runs seen T times, on the joints J; NaN from where a simulation diverged."""
 
     position: np.ndarray
     """(R, T, J) true positions [rad, m]."""
@@ -59,9 +59,17 @@ class Rehearsed:
 
 
 def rehearse(
-    machine: Machine, motions: Sequence[Motion], effects: Sequence[Effect], step: float, settle: float
+    machine: Machine,
+    motions: Sequence[Motion],
+    effects: Sequence[Effect],
+    step: float,
+    settle: float,
+    between: bool = False,
 ) -> Rehearsed:
-    """Simulate the motions in steps of `step` [s], after the start pose was held for `settle` [s]."""
+    """Simulate the motions in steps of `step` [s], after the start pose was held for `settle` [s].
+
+    T is the motions' ticks, or with `between` the simulation's steps from the first to the last of these.
+    """
     parts: list[Rehearsed | None] = [None] * len(motions)
     for gain in dict.fromkeys(m.gain for m in motions):
         plant = machine.driven[gain]
@@ -69,7 +77,7 @@ def rehearse(
         some = [i for i, m in enumerate(motions) if m.gain == gain]
         for first in range(0, len(some), _TOGETHER):
             now = some[first : first + _TOGETHER]
-            made = _rehearse(machine, plant, varied, [motions[i] for i in now], step, settle)
+            made = _rehearse(machine, plant, varied, [motions[i] for i in now], step, settle, between)
             for k, i in enumerate(now):
                 parts[i] = _row(made, k)
     return joined([part for part in parts if part is not None])
@@ -103,14 +111,23 @@ def _row(made: Rehearsed, k: int) -> Rehearsed:
 
 
 def _rehearse(
-    machine: Machine, plant: Plant, varied: Variation, motions: Sequence[Motion], step: float, settle: float
+    machine: Machine,
+    plant: Plant,
+    varied: Variation,
+    motions: Sequence[Motion],
+    step: float,
+    settle: float,
+    between: bool,
 ) -> Rehearsed:
     before = _BEFORE + round(settle * machine.rate)
     sources = [_source(machine, motion, before) for motion in motions]
     ticks = len(motions[0].shape)
     starts = [(i, _BEFORE, before + ticks - 1) for i in range(len(motions))]
-    windows = cut(plant, machine.layout, sources, starts, outputs=before + ticks)
-    raw = residuals(plant, machine.layout, windows, [varied], step)[0][:, -ticks:]
+    windows, each = cut(plant, machine.layout, sources, starts, outputs=before + ticks), 1
+    if between:
+        each = max(1, round(1.0 / (machine.rate * step)))
+        windows = _seen_between(windows, ticks, each)
+    raw = residuals(plant, machine.layout, windows, [varied], step)[0][:, -((ticks - 1) * each + 1) :]
     reading, quat = -raw, None
     if plant.floating:
         turn = raw[..., machine.layout.slices["base_rot"]]
@@ -119,10 +136,20 @@ def _rehearse(
     velocity = reading[..., machine.layout.slices["joint_vel"]]
     model = varied.model
     servos = servos_of(model, [int(model.joint(name).id) for name in machine.joints])
-    targets = np.stack([m.targets for m in motions])
+    targets = np.repeat([m.targets for m in motions], each, axis=1)[:, : position.shape[1]]
     unlimited = np.full(len(machine.joints), np.inf)
     torque = servos.torque(position, velocity, targets * servos.gear, unlimited)
     return Rehearsed(position, reading, quat, torque, machine.layout)
+
+
+def _seen_between(windows: Windows, ticks: int, each: int) -> Windows:
+    """Windows of which the last ticks are seen `each` times as often, by sensors that read nothing."""
+    first, last = windows.out_time[:, -ticks], windows.out_time[:, -1]
+    fine = first[:, None] + np.linspace(0.0, 1.0, (ticks - 1) * each + 1) * (last - first)[:, None]
+    time = np.concatenate((windows.out_time[:, :-ticks], fine), axis=1)
+    measured = np.zeros((*time.shape, windows.measured.shape[-1]))
+    quat = None if windows.quat is None else np.broadcast_to([1.0, 0.0, 0.0, 0.0], (*time.shape, 4)).copy()
+    return replace(windows, out_time=time, measured=measured, quat=quat)
 
 
 def _source(machine: Machine, motion: Motion, before: int) -> Rollout:

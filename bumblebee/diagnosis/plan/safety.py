@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from bumblebee.diagnosis.plan.machine import Machine
 from bumblebee.diagnosis.plan.motions import Motion
 from bumblebee.diagnosis.plan.rehearsal import Rehearsed, rehearse
 from bumblebee.diagnosis.plan.stage import Stage
+from bumblebee.diagnosis.plan.unknowns import Case
+from bumblebee.diagnosis.simulation import vary
 
 LATE = "not looked at: the time was over"
 """Why a candidate was given up where the time is limited."""
@@ -29,12 +31,14 @@ class Verdict:
 
 
 def judge(stage: Stage, runs: Rehearsed, motions: Sequence[Motion]) -> list[Verdict]:
-    """One verdict a run."""
+    """One verdict a run, by what is seen at its ticks or between them."""
     machine, limits, around = stage.machine, stage.limits, stage.around
     qpos, qvel = runs.qpos(machine.plant, machine.qpos), runs.qvel(machine.plant)
     torque = np.clip(runs.torque, -limits.torque, limits.torque)  # a run that asks for more is refused before
-    # What the floor must bear of a standing robot jumps with every target.
-    every = 1 if machine.plant.floating else max(1, round(around.rule.every * machine.rate))
+    each = (runs.position.shape[1] - 1) // (len(motions[0].shape) - 1)
+    every = max(1, round(around.rule.every * machine.rate * each))
+    if machine.plant.floating:  # what the floor must bear of a standing robot jumps with every target
+        every = min(every, each)
     out = []
     for r in range(len(runs.position)):
         verdict = _by_joint(stage, runs, r, motions[r])
@@ -107,14 +111,21 @@ def made_safe(stage: Stage, motions: Sequence[Motion], step: float | None = None
     tests = [_Test(motion) for motion in motions]
     while any(t.goes_on(stage) for t in tests):
         for k, case in enumerate(stage.cases):
+            here = weighed(stage, case)
             while now := [t for t in tests if t.goes_on(stage) and k not in t.passed]:
                 some = [t.motion for t in now]
-                runs = rehearse(stage.machine, some, case.effects, step, stage.rules.motions.settle)
-                for test, verdict in zip(now, judge(stage, runs, some), strict=True):
+                runs = rehearse(stage.machine, some, case.effects, step, stage.rules.motions.settle, between=True)
+                for test, verdict in zip(now, judge(here, runs, some), strict=True):
                     test.hears(verdict, k, case.name, stage.rules.motions.shrink)
     kept = [t for t in tests if t.has_passed(stage)]
     shares = np.array([t.reached for t in kept]).reshape(len(kept), 3, len(stage.machine.home))
     return Safe([t.motion for t in kept], shares, Counter(t.reason for t in tests if not t.has_passed(stage)))
+
+
+def weighed(stage: Stage, case: Case) -> Stage:
+    """The stage of a robot that weighs what a case says."""
+    weighs = vary(stage.machine.plant, case.effects).model
+    return replace(stage, around=stage.around.weighing(weighs))
 
 
 def proven(stage: Stage, motions: Sequence[Motion]) -> Safe:

@@ -48,9 +48,9 @@ def cases_of(
         cases.append(Case("the diagnosed model", findings.effects))
     for finding in findings.listed:
         rest = [e for e in findings.effects if e is not finding.found]
-        for end, values in zip(("lower", "upper"), finding.ends(rule.beyond), strict=True):
+        for end, values in finding.ends(rule.beyond):
             if finding.differs(values, rule.same):
-                cases.append(Case(f"{finding.name} at the {end} end of its interval", [*rest, values], must=False))
+                cases.append(Case(f"{finding.name} at the {end}", [*rest, values], must=False))
     for finding, candidate, imitating in rivals:
         rest = [e for e in findings.effects if e is not finding.found]
         name = f"{candidate.effect} {candidate.where}".strip()

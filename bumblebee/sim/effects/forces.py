@@ -279,7 +279,7 @@ class StepHooks:
 
 
 def _aged(past: np.ndarray, present: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """What was so many `steps` (J,) ago, (n, J), linear between them; the `past` (n, L, J) goes on by one step."""
+    """Values (n, J) of so many `steps` (J,) ago, linear between them; the `past` (n, L, J) goes on by one step."""
     back, low, columns = past.shape[1], np.floor(steps).astype(int), np.arange(len(steps))
     path = np.concatenate((past, present[:, None]), axis=1)
     newer, older = path[:, back - low, columns], path[:, np.maximum(back - low - 1, 0), columns]

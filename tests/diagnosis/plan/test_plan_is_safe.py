@@ -11,6 +11,7 @@ from bumblebee.diagnosis.plan.contacts import Clash, Surroundings, inner_radius,
 from bumblebee.diagnosis.plan.motions import draw_motion, smooth_step
 from bumblebee.diagnosis.plan.safety import made_safe
 from bumblebee.errors import BadInput
+from bumblebee.sim.effects import add_to_spec, single
 from tests.diagnosis.arm import XML
 from tests.diagnosis.plan.made import LIMITS, planned
 from tests.diagnosis.stander import XML as STANDER
@@ -42,6 +43,59 @@ def test_a_plan_keeps_its_limits_on_the_declared_robot_and_at_both_ends_of_the_i
         assert (q > plan.limits.low - 1e-3).all() and (q < plan.limits.high + 1e-3).all()
         assert (np.abs(v) <= 1.02 * plan.limits.speed).all()
         assert (np.abs(tau) <= 1.02 * plan.limits.torque).all()
+
+
+def test_a_plan_keeps_its_speed_between_the_ticks_of_a_slow_rate() -> None:
+    config = replace(LIMITS, rate=20.0, speed={"": 1.0}, travel={"": 1.4}, pool=24, runs=3, seconds=6.0)
+    stage = set_stage(mujoco.MjSpec.from_string(XML), "arm", config, None, None)
+    safe = made_safe(replace(stage, cases=stage.cases[:1]), [draw_motion(stage.scope, 0, k) for k in range(12)])
+    model, home = mujoco.MjModel.from_xml_string(XML), stage.machine.home
+    model.opt.timestep = 0.001
+    assert len(safe.motions) > 3
+    for motion in safe.motions:
+        data, fastest = mujoco.MjData(model), 0.0
+        data.qpos[:] = home
+        for target in np.concatenate((np.tile(home, (40, 1)), motion.targets)):
+            data.ctrl[:] = target
+            for _ in range(50):
+                mujoco.mj_step(model, data)
+                fastest = max(fastest, np.abs(data.qvel).max())
+        assert fastest < 1.0
+
+
+def test_a_told_travel_does_not_take_the_ranges_margin() -> None:
+    ranged = XML.replace("<joint name", '<joint range="-1.5 1.5" limited="true" name')
+    plain, told = (
+        set_stage(mujoco.MjSpec.from_string(ranged), "arm", replace(LIMITS, travel=travel), None, None).limits
+        for travel in ({}, {"": 50.0})
+    )
+    np.testing.assert_array_equal(told.low, plain.low)
+    np.testing.assert_array_equal(told.high, plain.high)
+    assert (plain.high < 1.5).all()
+
+
+def test_balance_is_that_of_the_robot_that_is_rehearsed() -> None:
+    spec = mujoco.MjSpec.from_string(STANDER)
+    config = PlanConfig(speed={"": 6.0}, travel={"": 2.5})
+    stage = set_stage(spec, "stander", config, None, None)
+    model, rest = stage.machine.plant.model, np.zeros((1, stage.machine.plant.model.nv))
+    hold = np.zeros((1, len(stage.machine.home)))
+    assert stage.around.clash(stage.machine.qpos[None], rest, hold) is None
+    leaning = spec.copy()
+    add_to_spec(leaning, [single("link_com", "trunk", 0.5, 0.0, 0.0)])
+    clash = stage.around.weighing(leaning.compile()).clash(stage.machine.qpos[None], rest, hold)
+    assert clash and "centre of mass" in clash.reason
+    assert model.body("trunk").ipos[0] < 0.5
+
+
+def test_bodies_that_are_near_at_the_start_come_no_nearer() -> None:
+    beside = BLOCKED.replace('pos=".35 0 1.2"', f'pos="{0.04 + 0.008 + 0.05} 0 1.2"')
+    stage = set_stage(mujoco.MjSpec.from_string(beside), "arm", LIMITS, None, None)
+    around = Surroundings(stage.machine.plant, np.zeros(3), LIMITS.thresholds.plan.safety)
+    still = np.zeros((1, 3))
+    assert around.clash(still, still, still) is None
+    nearer = around.clash(np.array([[0.0, 0.008, 0.0]]), still, still)
+    assert nearer and nearer.reason == "l3 and world come closer than 7 mm"
 
 
 def test_the_limits_are_the_told_ones_less_their_margins() -> None:

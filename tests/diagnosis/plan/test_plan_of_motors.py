@@ -65,5 +65,30 @@ def test_an_interval_without_an_end_reaches_beyond_the_effect() -> None:
     told = entry("viscous_friction", "j2", 0.4, 0.1, [], "damping")
     told["parameters"]["damping"]["ci95"] = [None, None]
     finding = findings_of({"effects": [told]}, [single("viscous_friction", "j2", 0.4)]).listed[0]
-    low, high = finding.ends(2.0)
+    (_, low), (_, high) = finding.ends(2.0)
     assert low.value() == 0.0 and high.value() == pytest.approx(0.8)
+
+
+def test_every_parameter_has_the_ends_of_its_interval() -> None:
+    told = entry("joint_spring", "j2", 3.0, 1.0, [], "stiffness")
+    told["parameters"]["preload"] = {"value": 0.5, "ci95": [-4.0, 4.0], "nominal": 0.0, "unit": "N m"}
+    finding = findings_of({"effects": [told]}, [single("joint_spring", "j2", 3.0, 0.5)]).listed[0]
+    ends = {name: effect.values() for name, effect in finding.ends(2.0)}
+    assert ends == {
+        "lower end of its interval": (2.0, 0.5),
+        "upper end of its interval": (4.0, 0.5),
+        "lower end of its preload": (3.0, -4.0),
+        "upper end of its preload": (3.0, 4.0),
+    }
+
+
+def test_a_gain_at_which_the_robot_may_not_rest_is_left_out_and_the_robot_is_not() -> None:
+    """With 1.8 kg the upright arm needs more than a tenth of its kp to stay so; declared it needs less."""
+    told = entry("link_mass", "l3", 1.0, 0.8, [], "mass")
+    told["parameters"]["mass"]["nominal"] = 0.7
+    found = findings_of({"effects": [told]}, [single("link_mass", "l3", 1.0)])
+    config = replace(LIMITS, gains=(1.0, 0.1), speed={"": 9.0})
+    stage = set_stage(mujoco.MjSpec.from_string(XML), "arm.xml", config, None, found)
+    assert stage.restless["kp x 0.1"].startswith("link mass l3 at the upper end") and any(
+        "upper end" in case.name for case in stage.cases
+    )
