@@ -66,7 +66,7 @@ class Small:
         now = len(self.ticks) * PERIOD
         late, tick = now * 1e-9 - self.at, self.ticks[-1] if self.ticks else None
         whole = late < 0
-        keys = Keys(now, goes=2)
+        keys = Keys(now, goes=1 + (self.guard.phase >= Phase.READY))
         if (told := keys if whole else self.keys(keys, late)) is not None:
             self.guard.told(now, told)
         if tick is not None and tick.question is not None:

@@ -47,11 +47,13 @@ TRIPS: dict[str, tuple[dict[str, Any], str, float]] = {
                            LIMITS.state_damp),
     "stamps stand still": (changed(stamp_ns=1), "silent", LIMITS.state_damp),
     "states are no numbers": (changed(joint_vel=NAN), "silent", LIMITS.state_damp),
+    "the IMU is broken": (changed(base_quat=np.zeros(4)), "silent", LIMITS.state_damp),
     "another robot speaks": (changed(robot=12), "silent", LIMITS.state_damp),
     "the policy hangs": ({"says": lambda answer, late: None}, "policy_late", 0.02 + LIMITS.policy_damp),
     "the policy wants no number": (wished(target=NAN), "policy_number", 0.025),
     "the policy wants far too much": (wished(target=HOLD + 3.0), "policy_far", 0.025),
     "the robot takes no orders": (changed(heard=0), "deaf", LIMITS.deaf),
+    "states come in order and late": ({"seen": lambda state, late: replace(state, heard=state.heard - 40)}, "deaf", 0),
     "the robot listens to another": (changed(controller=6), "other_controller", 0),
     "the robot damps by itself": (changed(mode=Mode.DAMP), "robot_damps", 0),
     "the dead-man's key is let go": ({"keys": lambda keys, late: replace(keys, held_ns=keys.held_ns - int(1e9 * late))},
@@ -121,6 +123,25 @@ def test_nothing_moves_before_go_is_said_twice() -> None:
     small.until(Phase.RUN)
 
 
+def test_said_twice_before_the_robot_is_ready_it_is_once() -> None:
+    small = Small(plan(unattended=False), keys=lambda keys, late: replace(keys, goes=2), at=0.0)
+    small.until(Phase.READY)
+    small.run(2.0)
+    assert small.guard.phase is Phase.READY
+
+
+def test_after_a_guard_that_stood_still_a_robot_that_hangs_rises_anew() -> None:
+    """It damped meanwhile and hangs elsewhere: its joints are taken up where they are."""
+    stood = iter([400])
+    small = Small(seen=lambda state, late: replace(state, joint_pos=HOLD - 0.7), missed=lambda late: next(stood, 0))
+    small.at = small.until(Phase.RISE) + 0.05
+    small.run(0.08)
+    first = next(k for k, tick in enumerate(small.ticks) if "own_ticks" in tick.rules)
+    targets = np.array([tick.order.target for tick in small.ticks[first + 1 : first + 4]])
+    assert small.guard.phase is Phase.RISE
+    np.testing.assert_allclose(targets, np.tile(HOLD - 0.7, (3, 1)), atol=0.01)
+
+
 def test_a_short_silence_holds_and_then_the_policy_goes_on() -> None:
     small = Small(seen=lambda state, late: None if late < 0.03 else state)
     small.at = small.until(Phase.RUN) + 0.11
@@ -153,6 +174,14 @@ def test_the_push_outward_fades_in_the_soft_zone_and_torque_keeps_within_its_lim
         assert sent.target[2] == pytest.approx(max(0.4, reading - 50.0 / 40.0))  # back into the range: as it was
         assert over[0] == (share == 1.0)
         assert (np.abs(torque_of(seen, sent)) <= drives().effort * (1 + 1e-9)).all()
+
+
+def test_a_torque_beside_the_target_fades_in_the_soft_zone_too() -> None:
+    for reading, share in ((1.88, 1.0), (1.94, 0.5), (2.0, 0.0)):
+        at = np.array([reading, -reading, reading])
+        wish = Wish(at, np.full(3, 40.0), np.full(3, 2.0), np.array([20.0, -20.0, -20.0]))
+        sent, _ = cut(state(joint_pos=at, joint_vel=np.zeros(3)), wish, drives(), LIMITS)
+        np.testing.assert_allclose(sent.torque, [20.0 * share, -20.0 * share, -20.0], atol=1e-9)  # the last: back in
 
 
 def test_pressing_stop_again_takes_the_torque_off() -> None:

@@ -75,6 +75,15 @@ def test_a_listener_that_was_killed_leaves_nothing_behind(tmp_path: Path) -> Non
     assert os.listdir(tmp_path / "w") == [] and stat.S_IMODE((tmp_path / "w").stat().st_mode) == 0o700
 
 
+def test_files_that_are_no_sockets_are_left_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "w"
+    robot = open_link("sim", [STATE], str(folder))
+    (folder / "CONTRACT-1.pdf").write_text("ours")
+    robot.send(ORDER, b"order")
+    robot.close()
+    assert (folder / "CONTRACT-1.pdf").read_text() == "ours"
+
+
 def test_wires_that_cannot_be_opened_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "open").mkdir(mode=0o755)
     (tmp_path / "file").write_text("")

@@ -54,7 +54,7 @@ class Surroundings:
         self.radius = inner_radius(np.array(points)) if points else 0.0
 
     def weighing(self, other: mujoco.MjModel) -> "Surroundings":
-        """The same of a robot whose bodies weigh what those of another model do; of a fixed base none is asked."""
+        """Surroundings of a robot whose bodies weigh what those of another model do; a fixed base asks for none."""
         if not self._floating:
             return self
         heavy = copy.copy(self)

@@ -77,8 +77,8 @@ class SocketLink:
         now = time.monotonic()
         if now - self._looked >= _LOOK:
             self._looked, own = now, self._path.name
-            names = (name for name in os.listdir(self._folder) if name != own)
-            self._others = [(name.partition("-")[0], str(self._folder / name)) for name in names]
+            sockets = (path for path in self._folder.iterdir() if path.name != own and path.is_socket())
+            self._others = [(path.name.partition("-")[0], str(path)) for path in sockets]
         return self._others
 
 

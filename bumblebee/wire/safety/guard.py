@@ -55,7 +55,7 @@ class Guard:
         self.phase, self.reason = Phase.WAIT, ""
         """Phase now, and the rule that ended the run; "" where it ended in good order."""
         self._now, self._since, self._keys, self._keys_came = now, now, Keys(now), now
-        self._sequence, self._count, self._missed = 0, 0, 0
+        self._sequence, self._count, self._goes = 0, 0, 0
         self._answer: Answer | None = None
         self._asked, self._due = -1, 0  # when the newest question was asked [ns], -1 for none that is open; until when
         self._begin, self._rise = np.zeros(len(drives.joints)), 0.0
@@ -95,6 +95,8 @@ class Guard:
             missed: ticks in a row that should have been before this one and were not.
         """
         self._now, state = now, self.intake.state
+        if missed > self._plan.limits.missed and self.phase in (Phase.RISE, Phase.READY) and state is not None:
+            self._begin_to_rise(now, state)  # the robot has damped meanwhile, and hangs elsewhere
         self._move_on(now, state)
         question = self._ask(now, state, missed)
         wish = self._wish(now, state)
@@ -131,11 +133,11 @@ class Guard:
         plan, ramps, gone = self._plan, self._plan.ramps, (now - self._since) / SECOND
         go = lambda count: plan.unattended or self._keys.goes >= count  # noqa: E731
         if self.phase is Phase.WAIT and state is not None and state.controller == plan.controller and go(1):
-            self._begin, self._rise = state.joint_pos.copy(), rise_time(state.joint_pos, plan.hold, ramps)
-            self._enter(Phase.RISE, now)
+            self._begin_to_rise(now, state)
         elif self.phase is Phase.RISE and gone >= self._rise:
+            self._goes = self._keys.goes
             self._enter(Phase.READY, now)
-        elif self.phase is Phase.READY and gone >= ramps.ready and go(2):
+        elif self.phase is Phase.READY and gone >= ramps.ready and go(self._goes + 1):
             self._enter(Phase.BLEND, now)
         elif self.phase is Phase.BLEND and gone >= ramps.blend and self._count % plan.every == 0:
             self._enter(Phase.RUN, now)
@@ -145,6 +147,11 @@ class Guard:
                 self._enter(Phase.DAMP, now)
         elif self.phase is Phase.DAMP and gone >= ramps.damp:
             self._enter(Phase.OFF, now)
+
+    def _begin_to_rise(self, now: int, state: State) -> None:
+        """Ramp from where the joints are."""
+        self._begin, self._rise = state.joint_pos.copy(), rise_time(state.joint_pos, self._plan.hold, self._plan.ramps)
+        self.phase, self._since = Phase.RISE, now
 
     def _end(self, reason: str, phase: Phase, now: int) -> None:
         self.reason = self.reason or reason
@@ -223,7 +230,7 @@ class Guard:
             carries=self.phase is Phase.RUN,
             state_age=self.intake.age(now),
             policy_late=late,
-            deaf=self._watch.deaf(state, now),
+            deaf=self._watch.deaf(state, now, self._sequence),
             key_age=(now - self._keys.held_ns) / SECOND if attended and moving else 0.0,
             console_age=(now - self._keys_came) / SECOND,
             stops=self._keys.stops,

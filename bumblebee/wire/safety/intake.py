@@ -8,6 +8,7 @@ import numpy as np
 from bumblebee.wire.messages import State
 
 _ALWAYS = ("joint_pos", "joint_vel", "base_quat", "base_ang_vel")
+_UNIT = 0.05  # by which a quaternion's length may be off 1: zeros of a broken IMU would read as upright
 _ODOMETRY = {"velocity": "base_lin_vel", "height": "base_pos", "place": "base_pos"}
 
 
@@ -61,4 +62,6 @@ class Intake:
             return "repeated"
         if last is not None and (state.sequence < last.sequence or state.stamp_ns <= last.stamp_ns):
             return "out of order"
-        return "no numbers" if without_numbers(state, self._numbers) else ""
+        if without_numbers(state, self._numbers):
+            return "no numbers"
+        return "" if abs(np.linalg.norm(state.base_quat) - 1.0) < _UNIT else "no orientation"

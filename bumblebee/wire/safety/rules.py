@@ -98,22 +98,23 @@ def cut(state: State, wish: Wish, drives: Drives, limits: Limits) -> tuple[Wish,
     """The wish within range and torque, and which drives (J,) bool would have given more than their torque.
 
     A servo's target may lie beyond the range, as its distance makes the torque. In a soft zone what pushes outward
-    fades, from all of it at the zone's inner edge to nothing at the end of the range.
+    fades, target and torque, from all of it at the zone's inner edge to nothing at the end of the range.
     """
     room, reach = _room(state, wish, drives, limits), wish.target - state.joint_pos
-    soft = Wish(state.joint_pos + reach * room, wish.kp, wish.kd, wish.torque)
+    soft = Wish(state.joint_pos + reach * room, wish.kp, wish.kd, wish.torque * room)
     target = soft.target
     torque, most = torque_of(state, soft), limits.torque * drives.effort
     over = np.clip(torque, -most, most) - torque
     strong = wish.kp > 0
     target = target + np.where(strong, over / np.where(strong, wish.kp, 1.0), 0.0)
-    return Wish(target, wish.kp, wish.kd, wish.torque), over != 0
+    return Wish(target, wish.kp, wish.kd, soft.torque), over != 0
 
 
 def _room(state: State, wish: Wish, drives: Drives, limits: Limits) -> np.ndarray:
-    """Share (J,) of the soft zone that is left in the direction in which the wish pulls; 1 outside of it."""
+    """Share (J,) of the soft zone that is left in the direction in which the wish pushes; 1 outside of it."""
     width = limits.soft_zone * (drives.high - drives.low)
-    ahead = np.where(wish.target > state.joint_pos, drives.high - state.joint_pos, state.joint_pos - drives.low)
+    push = wish.kp * (wish.target - state.joint_pos) + wish.torque
+    ahead = np.where(push > 0, drives.high - state.joint_pos, state.joint_pos - drives.low)
     return np.clip(ahead / width, 0.0, 1.0)
 
 
@@ -218,7 +219,7 @@ def policy_far(now: Moment, drives: Drives, limits: Limits) -> Step:
 
 
 def deaf(now: Moment, drives: Drives, limits: Limits) -> Step:
-    """The robot takes none of our orders: it refuses them, or the line is broken one way."""
+    """The robot takes none of our orders, or we hear of it late: it refuses them, or the line is broken or slow."""
     return Step.DAMP if now.deaf > limits.deaf else Step.GO
 
 

@@ -32,8 +32,13 @@ class Watch:
         still = np.abs(state.joint_vel) < self._limits.still * self._drives.speed
         self.stalled = np.where(over & still, self.stalled + self._period, 0.0)
 
-    def deaf(self, state: State, now: int) -> float:
-        """Time [s] since the robot last took a new order, or since its first state where it took none."""
+    def deaf(self, state: State, now: int, sent: int) -> float:
+        """Time [s] since the robot last took a new order, or since its first state where it took none.
+
+        Or how old the newest order is that it had taken when it spoke, of as many as were `sent`: states that come in
+        order and late tell of orders taken long ago.
+        """
         if state.heard != self._heard:
             self._heard, self._heard_at = state.heard, now
-        return (now - self._heard_at) / SECOND
+        behind = (sent - state.heard) * self._period if 0 <= state.heard <= sent else 0.0
+        return max((now - self._heard_at) / SECOND, behind)
