@@ -151,7 +151,7 @@ class Guard:
     def _begin_to_rise(self, now: int, state: State) -> None:
         """Ramp from where the joints are."""
         self._begin, self._rise = state.joint_pos.copy(), rise_time(state.joint_pos, self._plan.hold, self._plan.ramps)
-        self.phase, self._since = Phase.RISE, now
+        self.phase, self._since, self._kept = Phase.RISE, now, None
 
     def _end(self, reason: str, phase: Phase, now: int) -> None:
         self.reason = self.reason or reason
