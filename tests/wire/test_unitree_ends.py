@@ -74,6 +74,24 @@ def test_an_order_comes_back_and_only_our_own_robot_is_told_that_it_carries_itse
     assert not real.order(order())["reserve"].any()  # type: ignore[index]
 
 
+def test_wrists_are_held_where_they_hang_when_the_robot_is_carried() -> None:
+    end, record = ControllerEnd(40.0, 1.0), low_state()
+    told(end)
+    end.order(order(Mode.OFF))
+    for moved, mode, held in (
+        (1.5, Mode.HOLD, 1.5),
+        (1.7, Mode.RUN, 1.5),
+        (0.2, Mode.DAMP, 1.5),
+        (0.2, Mode.HOLD, 0.2),
+    ):
+        record = record.copy()
+        record["motor_state"]["q"][HELD] = moved
+        end.state(record, WRITER, NOW, True)
+        sent = end.order(order(mode))
+        assert sent is not None
+        np.testing.assert_allclose(sent["motor_cmd"]["q"][HELD], held)
+
+
 def test_who_is_listened_to_is_told_by_readers_and_by_orders_that_are_not_ours() -> None:
     end = ControllerEnd(40.0, 1.0)
     assert told(end).controller == 0

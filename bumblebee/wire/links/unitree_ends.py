@@ -33,7 +33,8 @@ class ControllerEnd:
         require_served()
         self._kp, self._kd, self._codec = kp, kd, Codec(len(joint_names()))
         self._writers: list[int] = []
-        self._first: np.ndarray | None = None
+        self._before: np.ndarray | None = None
+        """The newest state before orders began to carry the joints."""
         self._sent: Order | None = None
         self._other = -SECOND
 
@@ -43,12 +44,12 @@ class ControllerEnd:
 
     def order(self, message: bytes) -> np.ndarray | None:
         """LowCmd_ of an order; None before a state has told where the wrists are."""
-        if self._first is None:
+        if self._before is None:
             return None
         self._sent = order = self._codec.order(message)
-        wrists = self._first["motor_state"]["q"][HELD]
-        sent = command(order, int(self._first["mode_machine"]), wrists, self._kp, self._kd)
-        if _simulated(self._first) and order.mode is Mode.RUN:
+        wrists = self._before["motor_state"]["q"][HELD]
+        sent = command(order, int(self._before["mode_machine"]), wrists, self._kp, self._kd)
+        if _simulated(self._before) and order.mode is Mode.RUN:
             sent["reserve"][0] = _SIMULATED
             sent["crc"] = checksum(sent)
         return sent
@@ -71,8 +72,8 @@ class ControllerEnd:
                 raise BadInput(f"unitree: LowState_: {name}", str(expected), str(record[name]), do)
         if writer not in self._writers:
             self._writers.append(writer)
-        if self._first is None:
-            self._first = record
+        if self._sent is None or self._sent.mode in (Mode.OFF, Mode.DAMP):
+            self._before = record
         robot, sent = 1 + self._writers.index(writer), self._sent if listened else None
         other, motors = now - self._other < RELEASE * SECOND, record["motor_state"][OURS]
         imu, unknown = record["imu_state"], np.full(3, np.nan)
