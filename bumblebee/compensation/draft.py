@@ -12,7 +12,9 @@ from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joint_names, joints, robot_bodies
 from bumblebee.robot.model import gains
 from bumblebee.sim.effects import Effect
+from bumblebee.sim.servo import servos_of
 
+_AS_DECLARED = 1e-3  # of a gain: what digits of an XML leave out
 ONLY_G1 = (
     "Only policies of the G1 have a runner that compensates; for another robot use the corrected model.xml itself."
 )
@@ -27,6 +29,13 @@ class DeclaredRobot:
     """(J,) addresses in qvel."""
     kp: np.ndarray
     kd: np.ndarray
+    own_kp: np.ndarray
+    """(J,) of the model's servos: other than the declared where it was corrected."""
+    own_kd: np.ndarray
+    offset: np.ndarray
+    """(J,) of the model's encoders [rad]."""
+    delay: np.ndarray
+    """(J,) of the model's commands [s]."""
     effort: np.ndarray
     """(J,) [N m]."""
     ranges: np.ndarray
@@ -40,11 +49,18 @@ class DeclaredRobot:
             came = f"one without {missing[0]} ({len(missing)} joints, bodies missing)"
             raise BadInput(where, "a model of the G1", came, ONLY_G1)
         table = joints()
+        kp, kd = np.array([gains(joint) for joint in table]).T
+        servos = servos_of(model, [int(model.joint(name).id) for name in joint_names()])
+        follows, a = servos.bias[:, 1] < 0, np.maximum(servos.actuator, 0)
         return cls(
             model=model,
             dofs=np.array([int(model.joint(name).dofadr[0]) for name in joint_names()]),
-            kp=np.array([gains(joint)[0] for joint in table]),
-            kd=np.array([gains(joint)[1] for joint in table]),
+            kp=kp,
+            kd=kd,
+            own_kp=_own(follows, -servos.bias[:, 1], kp),
+            own_kd=_own(follows, -servos.bias[:, 2], kd),
+            offset=np.where(follows, servos.bias[:, 0] / np.where(follows, servos.bias[:, 1], 1.0), 0.0),
+            delay=np.where(servos.actuator >= 0, model.actuator_delay[a], 0.0) if model.nu else np.zeros(len(kp)),
             effort=np.array([joint.effort_limit for joint in table]),
             ranges=np.array([joint.range for joint in table]),
         )
@@ -107,12 +123,13 @@ class Draft:
     @property
     def kp(self) -> np.ndarray:
         """(J,) [N m/rad] sent."""
-        return self.robot.kp / (self.arrays["strength"] * self.kp_factor)
+        return self.robot.own_kp / (self.arrays["strength"] * self.kp_factor)
 
     @property
     def kd_wanted(self) -> np.ndarray:
         """(J,) [N m s/rad] that the drive should give, less what the joint's own excess damping gives."""
-        return np.maximum(self.robot.kd - self.viscous, self.limits.damping_left * self.robot.kd)
+        own = self.robot.own_kd
+        return np.maximum(own - self.viscous, self.limits.damping_left * own)
 
     @property
     def kd(self) -> np.ndarray:
@@ -163,7 +180,7 @@ class Draft:
             kd=self.kd,
             lead_time=self.lead_time,
             torque_lead=self.torque_lead,
-            damping=self.viscous - (self.robot.kd - self.kd_wanted),
+            damping=self.viscous - (self.robot.own_kd - self.kd_wanted),
             bias=0.5 * a["asymmetry"] - a["preload"],
             imu=self.imu,
             cogging=tuple(self.cogging),
@@ -183,3 +200,8 @@ def _within(where: str, expected: str, values: np.ndarray, low: float, high: flo
     worst = int(np.argmax(np.where(np.isfinite(beyond), beyond, np.inf)))
     if not beyond[worst] <= 1e-9 * max(1.0, abs(high)):
         raise BadInput(where, expected, f"{values[worst]:.3g} {unit}".strip() + f" on {joint_names()[worst]}")
+
+
+def _own(follows: np.ndarray, gain: np.ndarray, declared: np.ndarray) -> np.ndarray:
+    """Gains (J,) of servos where they are surely others than the declared ones."""
+    return np.where(follows & (np.abs(gain / declared - 1.0) > _AS_DECLARED), gain, declared)

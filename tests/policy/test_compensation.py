@@ -237,6 +237,17 @@ def test_effects_count_by_what_they_exceed_the_policys_own_model() -> None:
     assert known.kd[column(KNEE)] == pytest.approx(gains(joints()[column(KNEE)])[1])
 
 
+def test_drives_offsets_and_delays_count_by_what_they_exceed_the_policys_own_model() -> None:
+    """A policy that was refined with a servo of .6 of its kp wants such a servo, and is sent the declared gain."""
+    spec, k = load_spec(), column(KNEE)
+    kinds = {"kp": 0.6, "kd": 0.7, "motor_strength": 0.8, "encoder_offset": 0.05, "command_delay": 0.02}
+    effects = [effect(kind, KNEE, value) for kind, value in kinds.items()]
+    add_to_spec(spec, effects)
+    declared, known = compensate(effects[:0]), compensate(effects, spec.compile())
+    for name in ("kp", "kd", "encoder_offset", "lead_time", "torque_lead"):
+        assert getattr(known, name)[k] == pytest.approx(getattr(declared, name)[k], abs=1e-6), name
+
+
 def at_rest(clip: Clip) -> Sensors:
     """Readings on the clip's first frame."""
     return Sensors(

@@ -47,7 +47,7 @@ class CommandDelay(Kind):
         return [along.commanded(c)]
 
     def undo(self, draft: Any, effect: Given, columns: Sequence[int]) -> tuple[str, str]:
-        draft.arrays["command_delay"][columns] = effect.value()
+        draft.arrays["command_delay"][columns] = np.maximum(effect.value() - draft.robot.delay[columns], 0.0)
         done = (
             "the reference's part is sent that much earlier, corrections are carried on; "
             "answers to what is read stay late"

@@ -42,7 +42,7 @@ class ViscousFriction(Kind):
     def undo(self, draft: Any, effect: Given, columns: Sequence[int]) -> tuple[str, str]:
         excess = effect.value() - draft.robot.model.dof_damping[draft.robot.dofs[columns]]
         draft.viscous[columns] = excess
-        taken = (draft.robot.kd - draft.kd_wanted)[columns]
+        taken = (draft.robot.own_kd - draft.kd_wanted)[columns]
         rest = "" if np.allclose(taken, excess) else f", {spread(excess - taken, 'N m s/rad')} fed forward"
         done = "kd sent is lower by it; the rest along the intended velocity"
         return done, f"{spread(taken, 'N m s/rad')} off kd{rest}"

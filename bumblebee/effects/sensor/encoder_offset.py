@@ -44,5 +44,6 @@ class EncoderOffset(Kind):
         yield Step((on.rules.joint.offset,))
 
     def undo(self, draft: Any, effect: Given, columns: Sequence[int]) -> tuple[str, str]:
-        draft.arrays["encoder_offset"][columns] = effect.value()
-        return "taken off the reading, added to the target", f"{effect.value():+.4g} rad"
+        excess = effect.value() - draft.robot.offset[columns]
+        draft.arrays["encoder_offset"][columns] = excess
+        return "taken off the reading, added to the target", f"{float(excess.mean()):+.4g} rad"
