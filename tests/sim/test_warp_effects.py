@@ -23,6 +23,8 @@ TORQUES = (
     single("thermal_fade", "left_hip_pitch_joint", 0.5),
     single("strength_drift", "right_hip_pitch_joint", 0.4),
     single("torque_lag", "right_elbow_joint", 0.02),
+    single("command_delay", "right_elbow_joint", 0.013),  # its lag, and a filter, behind a late command
+    single("command_delay", "left_ankle_pitch_joint", 0.02),
     single("command_filter", "left_ankle_pitch_joint", 0.03),
     single("command_rate_limit", "right_ankle_pitch_joint", 1.0),
     single("command_profile", "left_ankle_roll_joint", 30.0, 2.0),
