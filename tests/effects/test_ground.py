@@ -47,6 +47,14 @@ def sunk(model: mujoco.MjModel) -> float:
     return 0.1 - float(data.qpos[2])
 
 
+def in_plain_terms(time: float, friction: float) -> mujoco.MjModel:
+    """The sled and a floor that are both so soft and so rough: how deep a sled stands hangs on both."""
+    soft = f'solref="{time} 1"'
+    model = mujoco.MjModel.from_xml_string(SLED.format(sole=soft, floor=soft, more=""))
+    model.geom_friction[:, 0] = friction
+    return model
+
+
 @pytest.mark.parametrize(("parts", "friction"), WAYS.values(), ids=WAYS)
 def test_friction_and_softness_of_the_ground_are_read_and_written(parts: dict[str, str], friction: float) -> None:
     spec = mujoco.MjSpec.from_string(SLED.format(**parts))
@@ -63,3 +71,4 @@ def test_friction_and_softness_of_the_ground_are_read_and_written(parts: dict[st
         before, now = way(plant.model), way(vary(plant, [changed]).model)
         assert now == pytest.approx(way(written.compile()), rel=1e-6)
         assert now > 1.3 * before, (effect, before, now)
+    assert now == pytest.approx(sunk(in_plain_terms(value, friction)), rel=0.02)  # not merely softer: as soft as told

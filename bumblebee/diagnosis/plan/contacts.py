@@ -44,7 +44,8 @@ class Surroundings:
         self._pushed.opt.disableflags |= _NO_SERVOS
         self._forces, self._dof = mujoco.MjData(self._pushed), plant.dof
         self._place(rest)
-        self._known = {_pair(c): c.dist - rule.touch for c in self._contacts()}
+        self._touching = {_pair(c) for c in self._contacts() if c.dist < rule.touch}
+        self._near = {_pair(c) for c in self._contacts()} - self._touching
         self.feet = self._touching_world() if plant.floating else {}
         self._feet_at = {b: self._data.xpos[b, :2].copy() for b in self.feet}
         self._base = int(self.model.jnt_bodyid[self.model.dof_jntid[plant.base_dof]]) if plant.floating else 0
@@ -93,9 +94,8 @@ class Surroundings:
         model = self.model
         for c in self._contacts():
             one, other = (int(model.geom_bodyid[g]) for g in c.geom)
-            rest = self._known.get(_pair(c), np.inf)
-            least = min(self.rule.clearance, rest)  # what is near at rest comes no nearer; what touches there may
-            if c.dist >= least or rest <= 0.0 or self._adjacent(one, other):
+            least = self.rule.touch if _pair(c) in self._near else self.rule.clearance
+            if c.dist >= least or _pair(c) in self._touching or self._adjacent(one, other):
                 continue
             if {one, other} & set(self.feet) and 0 in (model.body_weldid[one], model.body_weldid[other]):
                 continue

@@ -67,6 +67,9 @@ def _travel(
     asked = given(names, config.travel, "--travel")
     told = np.isfinite(asked)
     if told.any():
+        # Who tells the travel may start nearer to a stop than the margin: there the range is what is left.
+        low = low - inside * (told & (machine.home < low))
+        high = high + inside * (told & (machine.home > high))
         low = np.where(told, np.maximum(low, machine.home - asked), low)
         high = np.where(told, np.minimum(high, machine.home + asked), high)
         said.append("--travel")

@@ -116,7 +116,7 @@ def _refuse_untold(plant: Plant, name: str) -> None:
             raise BadInput(
                 f"{name}: joint {joint!r}",
                 "a drive whose torque follows from its gains",
-                "a dcmotor or pid actuator",
+                "another law: a dcmotor, a pid, a gain that is no constant",
                 "Declare the position servo that it stands for.",
             )
 

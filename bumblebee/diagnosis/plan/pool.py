@@ -127,7 +127,9 @@ def resting(stage: Stage, cases: list[Case]) -> Stage:
         if not case.must and _unrest(stage, case, Gain()):
             out[case.name] = "does not even rest in the start pose"
             continue
-        for gain in (gain for gain in stage.machine.driven if str(gain) not in restless):
+        for gain in (
+            gain for gain in stage.machine.driven if str(gain) not in restless and (case.must or gain != Gain())
+        ):
             if found := _unrest(stage, case, gain):
                 if gain == Gain():
                     raise BadInput(

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.starts.base_height import lowest, touches
+from bumblebee.diagnosis.simulation.starts.base_height import lowest, moving_and_colliding
 from bumblebee.diagnosis.simulation.windows import Windows
 
 _known: WeakKeyDictionary[Windows, np.ndarray] = WeakKeyDictionary()
@@ -42,7 +42,7 @@ def without(models: Sequence[mujoco.MjModel], geoms: np.ndarray) -> Iterator[Non
 
 def _found(plant: Plant, windows: Windows) -> np.ndarray:
     model, rule = plant.model, plant.thresholds.culling
-    moving = [g for g in range(model.ngeom) if touches(model, g)]
+    moving = moving_and_colliding(model)
     fixed = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == 0 and _collides(model, g)]
     some = [g for g in moving if not any(_meet(model, g, other) for other in moving if other != g)]
     some = [g for g in some if g not in (*model.pair_geom1, *model.pair_geom2)]

@@ -17,7 +17,7 @@ class SafetyMargins:
     still: float = 0.05
     """Speed [rad/s, m/s] below which a joint counts as at rest at the start and at the end."""
     clearance: float = 0.01
-    """Distance [m] that bodies keep which do not touch at the start."""
+    """Distance [m] that bodies keep; those that are nearer at the start do not touch, those that touch there may."""
     every: float = 0.04
     """Time between two looks for contacts [s]: at 2 m/s a body comes 8 cm in it, and margins are checked, not impacts.
     """

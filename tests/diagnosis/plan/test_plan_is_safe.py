@@ -74,6 +74,13 @@ def test_a_told_travel_does_not_take_the_ranges_margin() -> None:
     assert (plain.high < 1.5).all()
 
 
+def test_with_a_told_travel_a_run_may_start_at_a_stop() -> None:
+    stopped = XML.replace("<joint name", '<joint range="0 1.5" limited="true" name')
+    limits = set_stage(mujoco.MjSpec.from_string(stopped), "arm", replace(LIMITS, travel={"": 0.5}), None, None).limits
+    np.testing.assert_array_equal(limits.low, np.zeros(3))
+    np.testing.assert_array_equal(limits.high, np.full(3, 0.5))
+
+
 def test_balance_is_that_of_the_robot_that_is_rehearsed() -> None:
     spec = mujoco.MjSpec.from_string(STANDER)
     config = PlanConfig(speed={"": 6.0}, travel={"": 2.5})
@@ -88,14 +95,14 @@ def test_balance_is_that_of_the_robot_that_is_rehearsed() -> None:
     assert model.body("trunk").ipos[0] < 0.5
 
 
-def test_bodies_that_are_near_at_the_start_come_no_nearer() -> None:
+def test_bodies_that_are_near_at_the_start_do_not_touch() -> None:
     beside = BLOCKED.replace('pos=".35 0 1.2"', f'pos="{0.04 + 0.008 + 0.05} 0 1.2"')
     stage = set_stage(mujoco.MjSpec.from_string(beside), "arm", LIMITS, None, None)
     around = Surroundings(stage.machine.plant, np.zeros(3), LIMITS.thresholds.plan.safety)
     still = np.zeros((1, 3))
     assert around.clash(still, still, still) is None
-    nearer = around.clash(np.array([[0.0, 0.008, 0.0]]), still, still)
-    assert nearer and nearer.reason == "l3 and world come closer than 7 mm"
+    nearer = around.clash(np.array([[0.0, 0.02, 0.0]]), still, still)
+    assert nearer and nearer.reason == "l3 and world come closer than 1 mm"
 
 
 def test_the_limits_are_the_told_ones_less_their_margins() -> None:
@@ -236,7 +243,7 @@ def test_a_drive_whose_torque_its_gains_do_not_tell_is_refused() -> None:
     motor = '<dcmotor name="j3" joint="j3" motorconst=".5" resistance="1" input="pos" controller="40 0 2"/>'
     assert last in XML
     config = replace(LIMITS, torque={"j3": 20.0})
-    with pytest.raises(BadInput, match=r"joint 'j3'.*dcmotor or pid"):
+    with pytest.raises(BadInput, match=r"joint 'j3'.*dcmotor"):
         set_stage(mujoco.MjSpec.from_string(XML.replace(last, motor)), "arm", config, None, None)
 
 

@@ -26,7 +26,7 @@ def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
 def heights_of(plant: Plant, qpos: np.ndarray) -> np.ndarray:
     """Height of the base (...) [m] at which the lowest point of states (..., nq) touches z = 0, wherever they are."""
     model, data, depth = plant.model, mujoco.MjData(plant.model), plant.thresholds.base_height.rest_depth
-    geoms = [g for g in range(model.ngeom) if touches(model, g)]
+    geoms = moving_and_colliding(model)
     out = np.zeros(qpos.shape[:-1])
     for at in np.ndindex(out.shape):
         data.qpos[:] = qpos[at]
@@ -36,9 +36,9 @@ def heights_of(plant: Plant, qpos: np.ndarray) -> np.ndarray:
     return out
 
 
-def touches(model: mujoco.MjModel, geom: int) -> bool:
-    """Whether a geometry moves and collides."""
-    return bool(colliding(model)[geom]) and model.body_weldid[model.geom_bodyid[geom]] != 0
+def moving_and_colliding(model: mujoco.MjModel) -> list[int]:
+    """Ids of geometries of bodies that can move, which can touch something."""
+    return np.flatnonzero(colliding(model) & (model.body_weldid[model.geom_bodyid] != 0)).tolist()
 
 
 def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
